@@ -1,0 +1,102 @@
+"""Small geometry on arrays: the vector algebra and transforms every stage shares.
+
+World space is right-handed with Y up, in metres, float64. Facet and quilt pixels are continuous
+coordinates, x to the right and y down, the first pixel's centre at (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+Float32Array: TypeAlias = NDArray[np.float32]
+IntArray: TypeAlias = NDArray[np.int64]
+Int32Array: TypeAlias = NDArray[np.int32]
+BoolArray: TypeAlias = NDArray[np.bool_]
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product along the last axis of (..., 3) arrays.
+
+    Written out because two triangles that share an edge must get exactly negated results when the
+    arguments trade places: products commute, and x − y is −(y − x), in IEEE arithmetic.
+    """
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=-1)
+
+
+def dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Dot product along the last axis of (..., 3) arrays, summed in the order x, y, z."""
+    result: FloatArray = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+    return result
+
+
+def normalized(v: FloatArray) -> FloatArray:
+    """Unit vectors along the last axis of `v` (..., 3); zero vectors stay zero."""
+    length = np.sqrt(dot(v, v))[..., None]
+    result: FloatArray = np.divide(v, length, out=np.zeros_like(v), where=length > 0)
+    return result
+
+
+def polygon_normal(corners: FloatArray) -> FloatArray:
+    """Newell's normal of a polygon (n, 3); its length is twice the polygon's area."""
+    local = corners - corners[0]
+    return cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
+
+
+def rotation_deg(angles: Sequence[float]) -> FloatArray:
+    """Rotation matrix (3, 3) that turns about X, then Y, then Z, by `angles` in degrees."""
+    turns = []
+    for axis, angle in enumerate(angles):
+        c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        turn = np.eye(3)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
+        turns.append(turn)
+    return np.asarray(turns[2] @ turns[1] @ turns[0])
+
+
+def transform(
+    translate: Sequence[float] = (0, 0, 0),
+    rotate_deg: Sequence[float] = (0, 0, 0),
+    scale: float | Sequence[float] = 1.0,
+) -> FloatArray:
+    """Affine map (4, 4) that scales, then rotates (X, then Y, then Z), then translates."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation_deg(rotate_deg) * np.asarray(scale, dtype=np.float64)
+    matrix[:3, 3] = translate
+    return matrix
+
+
+def transform_points(matrix: FloatArray, points: FloatArray) -> FloatArray:
+    """Apply an affine (4, 4) `matrix` to points (..., 3)."""
+    result: FloatArray = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return result
+
+
+def segments(start: IntArray) -> tuple[IntArray, IntArray]:
+    """Owner and offset of every element of a ragged array.
+
+    Args:
+        start: (n+1,) offsets, element k of row i standing at start[i] + k.
+
+    Returns:
+        row (C,) the row each element belongs to, and rank (C,) its place inside the row.
+    """
+    counts = np.diff(start)
+    row = np.repeat(np.arange(counts.size), counts)
+    return row, np.arange(start[-1]) - np.repeat(start[:-1], counts)
+
+
+def next_in_row(start: IntArray) -> IntArray:
+    """Index (C,) of every element's successor inside its row, the last one's being the first."""
+    row, rank = segments(start)
+    counts = np.diff(start)[row]
+    result: IntArray = start[row] + (rank + 1) % counts
+    return result

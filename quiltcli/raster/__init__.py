@@ -1,0 +1,1 @@
+"""Rasterization: which triangle does each pixel's ray meet first?"""
