@@ -47,7 +47,8 @@ def normalized(v: FloatArray) -> FloatArray:
 def polygon_normal(corners: FloatArray) -> FloatArray:
     """Newell's normal of a polygon (n, 3); its length is twice the polygon's area."""
     local = corners - corners[0]
-    return cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
+    normal: FloatArray = cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
+    return normal
 
 
 def rotation_deg(angles: Sequence[float]) -> FloatArray:
