@@ -1,0 +1,70 @@
+"""Files that appear whole or not at all.
+
+Everything the program leaves is written beside its place under a name that starts with a dot and
+ends in `.tmp`, and renamed when it is complete. A reader never meets half a file, and a crash leaves
+nothing but a file that no sequence or folder reader takes for a result.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from quiltcli.errors import OutputError, Problem
+
+
+def temporary_path(path: Path) -> Path:
+    """Where this process writes `path` until it is whole: `.NAME.PID.tmp` in the same folder."""
+    return path.with_name(f".{path.name}.{os.getpid()}.tmp")
+
+
+def write_problem(path: Path, cause: OSError | RuntimeError) -> Problem:
+    """What kept `path` from being written, in the words of the system.
+
+    OpenEXR reports a failed system call as a RuntimeError that ends in the system's sentence; the
+    name it mentions is that of the temporary file, which means nothing to a user.
+    """
+    said = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
+    said = said.rpartition('". ')[2].rstrip(".")
+    return Problem(f"cannot be written: {said}", file=str(path))
+
+
+@contextlib.contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Yield a temporary path to write to; it becomes `path` if the block ends well, else it is removed.
+
+    Raises:
+        OutputError: the file, or the folder around it, cannot be written.
+    """
+    if path.is_dir():
+        raise OutputError(Problem("is a folder, expected a file to write", file=str(path)))
+    temporary = temporary_path(path)
+    try:
+        yield temporary
+        temporary.replace(path)
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(write_problem(path, error)) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` as UTF-8 with bare newlines, whole or not at all (OutputError)."""
+    with whole_file(path) as temporary:
+        temporary.write_bytes(text.encode())
+
+
+def make_folder(path: Path) -> None:
+    """Make the folder `path` and those above it; do nothing when it is there already (OutputError)."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        for step in (path, *path.parents):
+            if step.exists() and not step.is_dir():
+                raise OutputError(Problem("is a file, expected a folder", file=str(step))) from error
+        raise OutputError(write_problem(path, error)) from error
