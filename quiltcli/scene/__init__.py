@@ -1,0 +1,8 @@
+"""The scene: every triangle in world space, with what shading needs to know of it."""
+
+from __future__ import annotations
+
+from quiltcli.scene.load import load_scene
+from quiltcli.scene.record import Lights, Materials, Scene
+
+__all__ = ["Lights", "Materials", "Scene", "load_scene"]

@@ -1,0 +1,134 @@
+"""One object of the scene, from the parts of its mesh to clean triangles with normals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, dot, normalized
+from quiltcli.scene.normals import CREASE_DEG, face_normals, smoothed
+from quiltcli.scene.part import Part
+
+# Height over length below which a triangle is a line.
+_THINNEST = 1e-12
+
+
+@dataclass(frozen=True)
+class Baked:
+    """Triangles of one object.
+
+    Attributes:
+        vertices: (V, 3) world metres, each used by some triangle.
+        triangles: (T, 3) indices.
+        normals: (V, 3) unit.
+        colors: (V, 3) linear, or None where no part has any.
+        flat: whether triangles are shaded with their own normals.
+        part: (T,) index of the part each triangle came from.
+        infinite: triangles dropped for a NaN or infinite vertex.
+        empty: triangles dropped for having no area.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    normals: Float32Array
+    colors: Float32Array | None
+    flat: bool
+    part: IntArray
+    infinite: int
+    empty: int
+
+
+def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
+    """Join the parts of an object, drop what cannot be drawn and settle the normals.
+
+    Args:
+        parts: already in world space.
+        mode: `auto` takes the file's normals and finds smooth ones, split at creases, where there
+            are none; `smooth` finds them everywhere and never splits; `flat` gives every triangle
+            its own.
+    """
+    base = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    vertices = np.concatenate([part.vertices for part in parts])
+    triangles = np.concatenate([_wound(part) + start for part, start in zip(parts, base, strict=False)])
+    owner = np.repeat(np.arange(len(parts)), [len(part.triangles) for part in parts])
+    infinite, empty = _broken(vertices, triangles)
+    keep = np.flatnonzero(~(infinite | empty))
+    triangles, owner = triangles[keep], owner[keep]
+
+    given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
+    colors = _given_colors(parts)
+    source, triangles, normals = _with_normals(
+        vertices, triangles, given, 180.0 if mode != "auto" else CREASE_DEG, keep_sources=colors is not None
+    )
+    return Baked(
+        vertices=vertices[source],
+        triangles=triangles,
+        normals=normals,
+        colors=None if colors is None else colors[source],
+        flat=mode == "flat",
+        part=owner,
+        infinite=int(np.count_nonzero(infinite)),
+        empty=int(np.count_nonzero(empty)),
+    )
+
+
+def _wound(part: Part) -> IntArray:
+    """Triangles with the winding that a mirrored placement turned put right."""
+    return part.triangles[:, ::-1] if part.mirrored else part.triangles
+
+
+def _broken(vertices: FloatArray, triangles: IntArray) -> tuple[BoolArray, BoolArray]:
+    """Triangles (T,) with a vertex that is nowhere, and the other ones that have no area."""
+    with np.errstate(all="ignore"):
+        points = vertices[triangles]
+        edges = np.roll(points, -1, axis=1) - points
+        length = dot(edges, edges).max(axis=1)
+        normal = face_normals(vertices, triangles)
+        area = np.sqrt(dot(normal, normal))
+        infinite = ~(np.isfinite(points).all(axis=(1, 2)) & np.isfinite(area))
+        return infinite, ~infinite & ~(area > _THINNEST * length)
+
+
+def _given_normals(parts: Sequence[Part]) -> FloatArray:
+    """Unit normals (V, 3) of the files, zero for a vertex that has none."""
+    found = [np.zeros_like(p.vertices) if p.normals is None else p.normals for p in parts]
+    normals = np.concatenate(found)
+    with np.errstate(all="ignore"):
+        good = np.isfinite(dot(normals, normals))
+    normals[~good] = 0.0
+    return normalized(normals)
+
+
+def _given_colors(parts: Sequence[Part]) -> Float32Array | None:
+    if all(part.colors is None for part in parts):
+        return None
+    return np.concatenate(
+        [np.ones(p.vertices.shape, np.float32) if p.colors is None else p.colors for p in parts]
+    )
+
+
+def _with_normals(
+    vertices: FloatArray, triangles: IntArray, given: FloatArray, crease_deg: float, *, keep_sources: bool
+) -> tuple[IntArray, IntArray, Float32Array]:
+    """Source vertex (V,), triangles (T, 3) and normals (V, 3): the given ones, computed ones for the rest."""
+    usable: BoolArray = given.any(axis=1)
+    has_own = usable[triangles].all(axis=1)
+    own, other = np.flatnonzero(has_own), np.flatnonzero(~has_own)
+    used, corners = _compact(triangles[own], len(vertices))
+    result = np.empty_like(triangles)
+    result[own] = corners
+    normals = given[used].astype(np.float32)
+    if not other.size:
+        return used, result, normals
+    found = smoothed(vertices, triangles[other], crease_deg, keep_sources=keep_sources)
+    result[other] = found.triangles + len(used)
+    return np.concatenate((used, found.source)), result, np.concatenate((normals, found.normals))
+
+
+def _compact(triangles: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """The vertices that are used, ascending, and the triangles with indices into those."""
+    used = np.zeros(count, dtype=np.bool_)
+    used[triangles] = True
+    return np.flatnonzero(used), (np.cumsum(used) - 1)[triangles]

@@ -1,0 +1,173 @@
+"""Load a scene: read its meshes, put them in the world, gather materials and lights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from quiltcli.errors import Problem, SceneError, raise_all
+from quiltcli.geometry import Float32Array, FloatArray, normalized
+from quiltcli.scene.asset import Asset, read_asset
+from quiltcli.scene.bake import Baked, bake
+from quiltcli.scene.part import Part, placed
+from quiltcli.scene.record import Lights, Scene
+from quiltcli.scene.surface import Surface, material_table
+
+if TYPE_CHECKING:
+    from quiltcli.job.scene import LightSpec, ObjectSpec, SceneFile
+
+Color = tuple[float, float, float]
+_DIM: Color = (0.1, 0.1, 0.1)
+
+
+def load_scene(scene: Path | str | SceneFile) -> Scene:
+    """Load a scene file, or a mesh or glTF file as a scene of one object.
+
+    Everything is baked to world space: instances, transforms (a mirroring one turns the winding
+    over), materials. Colours given in the scene file replace the mesh's own, vertex colours included.
+
+    Raises:
+        SceneError: a mesh is missing, unreadable, of an unknown kind or has no triangles. All
+            problems at once, each with the file, and the line and key of the scene file.
+        JobError: the scene file itself is wrong.
+    """
+    if isinstance(scene, (str, Path)):
+        path = Path(scene)
+        if path.suffix.lower() not in (".yaml", ".yml"):
+            return _mesh_scene(path)
+        from quiltcli.job import load_scene_file
+
+        return _file_scene(load_scene_file(path))
+    return _file_scene(scene)
+
+
+@dataclass
+class _Gathered:
+    """What the objects have brought so far."""
+
+    names: list[str] = field(default_factory=list)
+    baked: list[Baked] = field(default_factory=list)
+    materials: list[list[int]] = field(default_factory=list)
+    surfaces: dict[Surface, int] = field(default_factory=dict)
+    textures: int = 0
+    notices: list[str] = field(default_factory=list)
+
+    def add(self, name: str, asset: Asset, baked: Baked, surfaces: Sequence[Surface]) -> None:
+        """Append an object; its parts have the given surfaces."""
+        self.names.append(name)
+        self.baked.append(baked)
+        self.materials.append([self.surfaces.setdefault(s, len(self.surfaces)) for s in surfaces])
+        self.textures += asset.textures
+        for count, why in ((baked.infinite, "with NaN or infinite vertices"), (baked.empty, "of no area")):
+            if count:
+                self.notices.append(f"{name}: {_counted(count, 'triangle')} {why} dropped")
+        for missing in asset.missing:
+            self.notices.append(f"{name}: the material file {missing!r} is missing (default materials used)")
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _mesh_scene(path: Path) -> Scene:
+    """A mesh file as the only object, lit by the headlight."""
+    gathered = _Gathered()
+    asset = read_asset(path)
+    gathered.add(path.stem, asset, _baked(asset.parts, "auto", path), [part.surface for part in asset.parts])
+    return _assembled(gathered, (), (0.0, 0.0, 0.0))
+
+
+def _file_scene(spec: SceneFile) -> Scene:
+    """Every object of a scene file; all that fail are reported together."""
+    gathered = _Gathered()
+    assets: dict[Path, Asset] = {}
+    problems: list[Problem] = []
+    for index, item in enumerate(spec.objects):
+        try:
+            _add_object(gathered, item, assets)
+        except SceneError as error:
+            problems += [spec.source.problem(("objects", index, "mesh"), str(p)) for p in error.problems]
+    raise_all(SceneError, problems)
+    return _assembled(gathered, spec.lights, spec.background)
+
+
+def _add_object(gathered: _Gathered, item: ObjectSpec, assets: dict[Path, Asset]) -> None:
+    """Read, place and bake one object; a mesh that several objects show is read once."""
+    if item.mesh not in assets:
+        assets[item.mesh] = read_asset(item.mesh)
+    asset = assets[item.mesh]
+    override = {} if item.material is None else item.material.model_dump(exclude_none=True)
+    parts = asset.parts
+    if item.transform is not None:
+        parts = tuple(placed(part, item.transform.array) for part in parts)
+    if "color" in override:
+        parts = tuple(replace(part, colors=None) for part in parts)
+    surfaces = [part.surface.overridden(override) for part in parts]
+    gathered.add(item.name or item.mesh.stem, asset, _baked(parts, item.normals, item.mesh), surfaces)
+
+
+def _baked(parts: Sequence[Part], mode: str, path: Path) -> Baked:
+    baked = bake(parts, mode)
+    if not len(baked.triangles):
+        raise SceneError(Problem("every triangle is without area or not finite", str(path)))
+    return baked
+
+
+def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Color) -> Scene:
+    """One set of arrays for all objects."""
+    baked = gathered.baked
+    counts = [len(b.triangles) for b in baked]
+    base = np.cumsum([0, *(len(b.vertices) for b in baked)])
+    rows = [np.array(m, dtype=np.int32)[b.part] for m, b in zip(gathered.materials, baked, strict=True)]
+    triangles = [b.triangles + start for b, start in zip(baked, base, strict=False)]
+    return Scene(
+        vertices=np.concatenate([b.vertices for b in baked]),
+        triangles=np.concatenate(triangles).astype(np.int32),
+        normals=np.concatenate([b.normals for b in baked]),
+        colors=np.concatenate([_colors(b) for b in baked]),
+        flat=np.repeat([b.flat for b in baked], counts),
+        object=np.repeat(np.arange(len(baked), dtype=np.int32), counts),
+        material=np.concatenate(rows),
+        objects=tuple(gathered.names),
+        materials=material_table(list(gathered.surfaces)),
+        lights=_lights(lights),
+        background=np.array(background, dtype=np.float32),
+        notices=_notices(gathered, unlit=not lights),
+    )
+
+
+def _colors(baked: Baked) -> Float32Array:
+    return np.ones(baked.vertices.shape, np.float32) if baked.colors is None else baked.colors
+
+
+def _notices(gathered: _Gathered, *, unlit: bool) -> tuple[str, ...]:
+    notices = list(gathered.notices)
+    if gathered.textures:
+        textures = _counted(gathered.textures, "texture")
+        notices.append(f"textures are not drawn yet: {textures} ignored, base colours are shown instead")
+    if unlit:
+        notices.append("the scene has no lights: a headlight at the viewer and a dim ambient light are used")
+    return tuple(notices)
+
+
+def _lights(lights: Sequence[LightSpec]) -> Lights:
+    """The lights as arrays; without any, a headlight and a dim ambient light."""
+    sun = [light for light in lights if light.type == "directional"]
+    point = [light for light in lights if light.type == "point"]
+    ambient = [light.color for light in lights if light.type == "ambient"] or ([] if lights else [_DIM])
+    return Lights(
+        directional_direction=normalized(_rows([light.direction for light in sun])).astype(np.float32),
+        directional_color=_rows([light.color for light in sun]).astype(np.float32),
+        point_position=_rows([light.position for light in point]).astype(np.float32),
+        point_color=_rows([light.color for light in point]).astype(np.float32),
+        ambient=_rows(ambient).sum(axis=0).astype(np.float32),
+        headlight=not lights,
+    )
+
+
+def _rows(triples: Sequence[Color]) -> FloatArray:
+    return np.array(triples, dtype=np.float64).reshape(-1, 3)
