@@ -1,0 +1,69 @@
+"""The YAML files: their models, how they are read, and how they are written back.
+
+Load a file and every problem in it comes in one `JobError`; every model and part of a model has a
+`source`, whose `problem(key, message)` points into the file when a later stage finds something.
+"""
+
+from quiltcli.job.display import UNITS, DisplayFile, FacetSpec, ResolutionSpec, TransformSpec
+from quiltcli.job.dump import dump_job, dump_yaml
+from quiltcli.job.hashing import file_sha256, job_sha256
+from quiltcli.job.layout import LayoutFile, PackSpec, PageSpec, PlaceSpec, UvLayoutSpec
+from quiltcli.job.loading import (
+    check_file,
+    file_kind,
+    load_display_file,
+    load_job,
+    load_layout_file,
+    load_scene_file,
+)
+from quiltcli.job.render import CHANNELS, COMPRESSIONS, JobFile, OutputSpec, RenderSpec
+from quiltcli.job.scene import (
+    AmbientLight,
+    DirectionalLight,
+    LightSpec,
+    MaterialSpec,
+    ObjectSpec,
+    PointLight,
+    SceneFile,
+)
+from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, ViewerSpec
+
+__all__ = [
+    "CHANNELS",
+    "COMPRESSIONS",
+    "UNITS",
+    "AmbientLight",
+    "CsvSpec",
+    "DirectionalLight",
+    "DisplayFile",
+    "FacetSpec",
+    "JobFile",
+    "KeyframeSpec",
+    "LayoutFile",
+    "LightSpec",
+    "MaterialSpec",
+    "ObjectSpec",
+    "OrbitSpec",
+    "OutputSpec",
+    "PackSpec",
+    "PageSpec",
+    "PathSpec",
+    "PlaceSpec",
+    "PointLight",
+    "RenderSpec",
+    "ResolutionSpec",
+    "SceneFile",
+    "TransformSpec",
+    "UvLayoutSpec",
+    "ViewerSpec",
+    "check_file",
+    "dump_job",
+    "dump_yaml",
+    "file_kind",
+    "file_sha256",
+    "job_sha256",
+    "load_display_file",
+    "load_job",
+    "load_layout_file",
+    "load_scene_file",
+]

@@ -1,0 +1,169 @@
+"""The display file: which mesh, how large, and how many pixels its facets have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, WithJsonSchema
+
+from quiltcli import geometry
+from quiltcli.job.base import (
+    Complaint,
+    Count,
+    Direction,
+    FileModel,
+    Items,
+    MeshPath,
+    Model,
+    Number,
+    OneOf,
+    Positive,
+    Size,
+    Vec3,
+    complaint,
+    describe,
+    exactly_one,
+    one_of,
+)
+from quiltcli.job.layout import UvLayoutSpec
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+
+
+def _units(value: Any) -> Any:
+    if isinstance(value, str):
+        return one_of(UNITS, value, " or a number of metres")
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise complaint(f"expected m, cm, mm, in, ft or a number of metres, got {describe(value)}")
+    if not 0 < value < float("inf"):
+        raise complaint(f"must be greater than 0 and finite, got {value}")
+    return float(value)
+
+
+def _quarter(value: float) -> int:
+    if value % 90:
+        raise complaint(f"expected 0, 90, 180 or 270, got {value:g}")
+    return int(value) % 360
+
+
+def _scale(value: Any) -> Any:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return (value, value, value)
+    if isinstance(value, (list, tuple)) and len(value) == 3:
+        return tuple(value)
+    raise complaint(f"expected a number or 3 numbers, got {describe(value)}")
+
+
+_NUMBER_OR_3 = {
+    "anyOf": [
+        {"type": "number"},
+        {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+    ]
+}
+Row = Annotated[tuple[Number, Number, Number, Number], Items(4)]
+Units = Annotated[
+    str | float,
+    PlainValidator(_units),
+    WithJsonSchema({"anyOf": [{"enum": list(UNITS)}, {"type": "number", "exclusiveMinimum": 0}]}),
+]
+Scale = Annotated[tuple[Number, Number, Number], BeforeValidator(_scale), WithJsonSchema(_NUMBER_OR_3)]
+
+
+class TransformSpec(Model):
+    """Scale, then rotate about X, then Y, then Z, then translate; or a matrix that does it all."""
+
+    translate: Vec3 | None = None
+    """Shift, metres."""
+    rotate_deg: Vec3 | None = None
+    """Angles about X, then Y, then Z, degrees."""
+    scale: Scale | None = None
+    """One factor, or one for each axis."""
+    matrix: Annotated[tuple[Row, Row, Row, Row], Items(4, "rows of 4 numbers")] | None = None
+    """Four rows of four, for column vectors: the shift stands in the last column."""
+
+    @property
+    def array(self) -> geometry.FloatArray:
+        """World from local (4, 4), float64."""
+        if self.matrix is not None:
+            return np.asarray(self.matrix, dtype=np.float64)
+        zero, one = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+        return geometry.transform(self.translate or zero, self.rotate_deg or zero, self.scale or one)
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """A matrix stands alone; no transform flattens what it moves."""
+        if self.matrix is None:
+            if self.scale is not None and 0 in self.scale:
+                yield ("scale",), "must not be 0"
+            return
+        for name in ("translate", "rotate_deg", "scale"):
+            if getattr(self, name) is not None:
+                yield (name,), "cannot stand beside matrix (expected one or the other)"
+        if self.matrix[3] != (0.0, 0.0, 0.0, 1.0):
+            yield ("matrix", 3), "the last row of an affine map is [0, 0, 0, 1]"
+        elif np.linalg.matrix_rank(self.array[:3, :3]) < 3:
+            yield ("matrix",), "flattens space (its determinant is 0)"
+
+
+class ResolutionSpec(Model):
+    """How many pixels the facets have: one of the two keys."""
+
+    pixels_per_metre: Positive | None = None
+    """Pixels a metre, on every facet."""
+    facet_pixels: Size | None = None
+    """Width and height of every facet, for panels."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """One of the two."""
+        yield from exactly_one(self, "pixels_per_metre", "facet_pixels")
+
+
+class FacetSpec(Model):
+    """What is different on one facet."""
+
+    name: str = ""
+    """A name for messages and tables."""
+    facet_pixels: Size | None = None
+    """Width and height of this facet, pixels."""
+    up: Direction | None = None
+    """World direction that is up in the facet's image."""
+    rotate: Annotated[Number, AfterValidator(_quarter), WithJsonSchema({"enum": [0, 90, 180, 270]})] = 0
+    """Quarter turn of the raster, clockwise as seen from the lit side, degrees."""
+    mirror: bool = False
+    """Mirror the image, for rear projection."""
+    enabled: bool = True
+    """Whether the facet is rendered at all."""
+
+
+class DisplayFile(FileModel):
+    """A display of planar facets."""
+
+    kind: ClassVar[str] = "quilt_display"
+
+    quilt_display: Annotated[int, Field(ge=1, le=1)] = 1
+    """Version of the format."""
+    mesh: MeshPath
+    """Polygon mesh; every face is one facet, in the order of the file."""
+    units: Units = "m"
+    """What the mesh is measured in: m, cm, mm, in, ft, or a number of metres."""
+    viewing_side: Annotated[str, OneOf(("front", "back", "both"))] = "front"
+    """Lit side: front, where the winding faces; back, seen from inside; both."""
+    resolution: ResolutionSpec
+    """How many pixels the facets have."""
+    facets: dict[Count, FacetSpec] = Field(default_factory=dict)
+    """What is different on single facets, by facet id."""
+    transform: TransformSpec | None = None
+    """Place of the display in the world."""
+    layout: UvLayoutSpec | None = None
+    """Take the layout from the texture coordinates of the mesh."""
+
+    @property
+    def metres(self) -> float:
+        """Length of one mesh unit, metres."""
+        return UNITS[self.units] if isinstance(self.units, str) else self.units
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """A mirrored display would be lit on the wrong side."""
+        if self.transform is not None and np.linalg.det(self.transform.array[:3, :3]) < 0:
+            yield ("transform",), "mirrors the display (its determinant is negative)"

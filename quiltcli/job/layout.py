@@ -1,0 +1,115 @@
+"""The layout file, and what a job may say instead of naming one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from quiltcli.job.base import (
+    AnyPath,
+    Complaint,
+    Count,
+    Direction,
+    FileModel,
+    Items,
+    Listed,
+    Model,
+    Natural,
+    Number,
+    Size,
+    Vec3,
+)
+
+
+class PackSpec(Model):
+    """How to pack the facets of a display onto quilt pages."""
+
+    method: str = "rows"
+    """Packing method."""
+    size: Size = (8192, 8192)
+    """Width and height of a page, pixels."""
+    max_pages: Count | None = None
+    """Most pages that may be used; any number when absent."""
+    padding: Natural = 2
+    """Pixels kept free between facets."""
+
+
+class UvLayoutSpec(Model):
+    """The layout in the texture coordinates of the display mesh: UV times size is the quilt pixel."""
+
+    from_uv: Literal[True]
+    """Always true."""
+    size: Size
+    """Width and height of the page, pixels."""
+
+
+class PageSpec(Model):
+    """A page of the quilt."""
+
+    size: Size
+    """Width and height, pixels."""
+
+
+Row = Annotated[tuple[Number, Number, Number], Items(3)]
+Point = Annotated[tuple[Number, Number], Items(2)]
+
+
+class PlaceSpec(Model):
+    """The place of one facet."""
+
+    id: Count
+    """Facet id."""
+    page: Count
+    """Page, the first being 1."""
+    size: Size
+    """Width and height of the facet's raster, pixels."""
+    quilt_from_facet: Annotated[tuple[Row, Row], Items(2, "rows of 3 numbers")]
+    """Affine map from facet pixels to pixels of the page."""
+    origin: Vec3
+    """World position of the raster's top-left corner, metres."""
+    du: Direction
+    """World step to the next pixel right, metres."""
+    dv: Direction
+    """World step to the next pixel down, metres."""
+    polygon: Annotated[tuple[Point, ...], Listed, Field(min_length=3)]
+    """Corners in facet pixels."""
+
+
+class LayoutFile(FileModel):
+    """Where each facet's pixels lie in the quilt."""
+
+    kind: ClassVar[str] = "quilt_layout"
+
+    quilt_layout: Annotated[int, Field(ge=1, le=1)] = 1
+    """Version of the format."""
+    display: AnyPath | None = None
+    """The display file the layout was made for."""
+    display_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
+    """Hash of that display's geometry."""
+    method: str = "manual"
+    """Packing method it was made by."""
+    padding: Natural = 0
+    """Pixels kept free between facets."""
+    pages: Annotated[tuple[PageSpec, ...], Listed, Field(min_length=1)]
+    """Pages of the quilt."""
+    facets: Annotated[tuple[PlaceSpec, ...], Listed, Field(min_length=1)]
+    """Places of the facets."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """Ids are unique, pages exist, no map flattens its facet."""
+        first: dict[int, int] = {}
+        for i, place in enumerate(self.facets):
+            if place.id in first:
+                yield (
+                    ("facets", i, "id"),
+                    f"facet {place.id} already has a place, at facets[{first[place.id]}]",
+                )
+            first.setdefault(place.id, i)
+            if place.page > len(self.pages):
+                pages = f"{len(self.pages)} page" + "s" * (len(self.pages) > 1)
+                yield ("facets", i, "page"), f"there is no page {place.page} (the layout has {pages})"
+            (a, b, _), (c, d, _) = place.quilt_from_facet
+            if a * d == b * c:
+                yield ("facets", i, "quilt_from_facet"), "flattens the facet (its determinant is 0)"

@@ -1,0 +1,39 @@
+"""JSON Schemas of the four file kinds, for editors that check YAML while it is typed.
+
+`python -m quiltcli.job.schema docs/schema` writes them.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from quiltcli.job.loading import MODELS
+
+
+def schemas() -> dict[str, str]:
+    """Text of every schema by file name, `job.schema.json` and so on."""
+    return {f"{kind.removeprefix('quilt_')}.schema.json": _text(kind) for kind in MODELS}
+
+
+def write_schemas(directory: Path) -> None:
+    """Write every schema into a folder."""
+    directory.mkdir(parents=True, exist_ok=True)
+    for name, text in schemas().items():
+        (directory / name).write_text(text, encoding="utf-8")
+
+
+def _text(kind: str) -> str:
+    model = MODELS[kind]
+    schema: dict[str, Any] = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    schema.update(model.model_json_schema(by_alias=True))
+    # Python code may leave the version out; a file must not.
+    schema["required"] = [kind, *schema.get("required", [])]
+    schema["title"] = f"{kind} file"
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    write_schemas(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/schema"))

@@ -1,0 +1,209 @@
+"""The viewer of a job: depth range and path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+
+from quiltcli.errors import JobError
+from quiltcli.frames import parse_frames
+from quiltcli.job.base import (
+    Complaint,
+    Direction,
+    ExistingFile,
+    Listed,
+    Model,
+    Number,
+    OneOf,
+    Positive,
+    Vec3,
+    complaint,
+    describe,
+    exactly_one,
+)
+from quiltcli.job.display import UNITS, Units
+
+Vector = tuple[float, float, float]
+
+
+def read_range(value: Any) -> Any:
+    """Frames as YAML gives them: a range text or one whole number."""
+    if isinstance(value, tuple):
+        return value
+    if isinstance(value, bool) or not isinstance(value, (str, int)):
+        raise complaint(f"expected a frame range such as 1-240, 1-9x2 or 1,5,20-30, got {describe(value)}")
+    try:
+        return parse_frames(str(value))
+    except JobError as error:
+        raise complaint(error.problems[0].message) from None
+
+
+FrameRange = Annotated[
+    tuple[int, ...],
+    BeforeValidator(read_range),
+    WithJsonSchema({"type": ["string", "integer"], "examples": ["1-240", "1-9x2", "1,5,20-30"]}),
+]
+
+
+def pose_complaints(
+    eye: Vector, look_at: Vector | None, look: Vector | None, up: Vector
+) -> Iterator[Complaint]:
+    """What makes a pose impossible."""
+    if look_at is not None:
+        look = (look_at[0] - eye[0], look_at[1] - eye[1], look_at[2] - eye[2])
+        if math.hypot(*look) < 1e-9:
+            yield ("look_at",), "is where the viewer is (expected a point to look at)"
+            return
+    if look is not None and parallel(look, up):
+        yield ("look_at" if look_at is not None else "look",), "looks along up (turn up to another direction)"
+
+
+def parallel(a: Vector, b: Vector) -> bool:
+    """Whether two vectors (3,) enclose less than a millionth of a radian, either way round."""
+    across = math.hypot(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    return across <= 1e-6 * math.hypot(*a) * math.hypot(*b)
+
+
+class KeyframeSpec(Model):
+    """The pose at one frame."""
+
+    frame: int
+    """Frame number."""
+    position: Vec3
+    """Place of the eye, metres."""
+    look_at: Vec3 | None = None
+    """Point that is looked at, metres."""
+    look: Direction | None = None
+    """Direction of view, instead of `look_at`."""
+    up: Direction = (0.0, 1.0, 0.0)
+    """Direction that is up in the view."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """One aim, and a possible one."""
+        yield from exactly_one(self, "look_at", "look")
+        yield from pose_complaints(self.position, self.look_at, self.look, self.up)
+
+
+def _nonzero(value: float) -> float:
+    if value == 0:
+        raise complaint("must not be 0")
+    return value
+
+
+class OrbitSpec(Model):
+    """A circle about the vertical axis through a centre."""
+
+    center: Vec3
+    """Centre, metres."""
+    radius: Positive
+    """Distance from the centre, or from the vertical axis when `height` is given, metres."""
+    height: Number | None = None
+    """Height of the eye over the centre, metres."""
+    elevation_deg: Annotated[float, Field(allow_inf_nan=False, ge=-90, le=90)] | None = None
+    """Angle of the eye over the horizon as seen from the centre, instead of `height`."""
+    start_deg: Number = 0.0
+    """Angle at the first frame: 0 stands on the +Z side, 90 on the +X side."""
+    start_frame: int = 1
+    """Frame at which the eye is at `start_deg`."""
+    frames_per_turn: Annotated[Number, AfterValidator(_nonzero)] | None = None
+    """Frames for a whole turn, for ever; negative turns the other way."""
+    end_deg: Number | None = None
+    """Angle at `end_frame`, instead of whole turns; the eye rests before and after."""
+    end_frame: int | None = None
+    """Frame at which the eye is at `end_deg`."""
+    look_at: Vec3 | None = None
+    """Point that is looked at; the centre when absent."""
+    up: Direction = (0.0, 1.0, 0.0)
+    """Direction that is up in the view."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """Turn or sweep, height or elevation."""
+        yield from exactly_one(self, "frames_per_turn", "end_deg")
+        if self.height is not None and self.elevation_deg is not None:
+            yield ("elevation_deg",), "cannot stand beside height (expected one or the other)"
+        if (self.end_deg is None) != (self.end_frame is None):
+            missing = "end_deg" if self.end_deg is None else "end_frame"
+            yield (missing,), "missing key (end_deg and end_frame go together)"
+        if self.end_frame is not None and self.end_frame <= self.start_frame:
+            yield ("end_frame",), f"must be after start_frame ({self.start_frame}), got {self.end_frame}"
+
+
+class CsvSpec(Model):
+    """A recorded path: one row a frame."""
+
+    file: Annotated[Path, ExistingFile((".csv", ".txt"), "a CSV file")]
+    """CSV file with frame, x, y, z, and if it has them look_at_x … or look_x …, and up_x …."""
+    units: Units = "m"
+    """What positions are measured in."""
+    fill: bool = False
+    """Interpolate linearly over frames that have no row; otherwise they are an error."""
+    look_at: Vec3 | None = None
+    """Point that is looked at (metres), when the file does not say."""
+    look: Direction | None = None
+    """Direction of view, when the file does not say."""
+    up: Direction = (0.0, 1.0, 0.0)
+    """Direction that is up in the view, when the file does not say."""
+
+    @property
+    def metres(self) -> float:
+        """Length of one unit of the file, metres."""
+        return UNITS[self.units] if isinstance(self.units, str) else self.units
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """One aim at most."""
+        if self.look_at is not None and self.look is not None:
+            yield from exactly_one(self, "look_at", "look")
+
+
+def _csv(value: Any) -> Any:
+    return value if isinstance(value, (dict, Model)) else {"file": value}
+
+
+class PathSpec(Model):
+    """Where the viewer is: exactly one kind of path."""
+
+    keyframes: Annotated[tuple[KeyframeSpec, ...], Listed, Field(min_length=1)] | None = None
+    """Poses at some frames; the ends are held."""
+    interpolation: Annotated[str, OneOf(("linear", "smooth", "hold"))] | None = None
+    """Between keyframes: linear (the default), smooth, hold."""
+    orbit: OrbitSpec | None = None
+    """A circle."""
+    csv: Annotated[CsvSpec, BeforeValidator(_csv)] | None = None
+    """A recorded path: a file name, or a mapping with `file`."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """One kind, keyframes apart in time, all aimed the same way."""
+        yield from exactly_one(self, "keyframes", "orbit", "csv")
+        if self.keyframes is None:
+            if self.interpolation is not None:
+                yield ("interpolation",), "belongs to keyframes, and there are none"
+            return
+        first: dict[int, int] = {}
+        for i, key in enumerate(self.keyframes):
+            if key.frame in first:
+                words = f"frame {key.frame} is already given by keyframes[{first[key.frame]}]"
+                yield ("keyframes", i, "frame"), words
+            first.setdefault(key.frame, i)
+            if (key.look is None) != (self.keyframes[0].look is None):
+                words = "keyframes[0] aims the other way (use look_at in all keyframes, or look in all)"
+                yield ("keyframes", i, "look_at" if key.look is None else "look"), words
+
+
+class ViewerSpec(Model):
+    """The viewer."""
+
+    near: Positive
+    """Nearest depth that is drawn, metres from the eye."""
+    far: Positive
+    """Farthest depth that is drawn, metres."""
+    path: PathSpec
+    """Where the eye is."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """The depth range is not empty."""
+        if self.near >= self.far:
+            yield ("far",), f"must be greater than near ({self.near:g}), got {self.far:g}"
