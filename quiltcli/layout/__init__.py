@@ -1,0 +1,29 @@
+"""The layout: where each facet's pixels lie in the quilt."""
+
+from quiltcli.layout.align import align
+from quiltcli.layout.check import check_layout, layout_problems
+from quiltcli.layout.file import layout_text, read_layout, write_layout
+from quiltcli.layout.fromuv import layout_from_polygons, layout_from_uv
+from quiltcli.layout.owners import pixel_owners
+from quiltcli.layout.picture import layout_picture
+from quiltcli.layout.record import Layout, quilt_polygons, whole_pixel
+from quiltcli.layout.spans import Spans, facet_spans, fill
+
+__all__ = [
+    "Layout",
+    "Spans",
+    "align",
+    "check_layout",
+    "facet_spans",
+    "fill",
+    "layout_from_polygons",
+    "layout_from_uv",
+    "layout_picture",
+    "layout_problems",
+    "layout_text",
+    "pixel_owners",
+    "quilt_polygons",
+    "read_layout",
+    "whole_pixel",
+    "write_layout",
+]

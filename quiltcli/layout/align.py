@@ -1,0 +1,130 @@
+"""Bring a display and a layout together: same facets, same rasters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from quiltcli.display import Facets, corner_pixels
+from quiltcli.errors import LayoutError, Problem, raise_all
+from quiltcli.geometry import FloatArray, IntArray, cross, dot, segments
+from quiltcli.layout.record import Layout
+
+_OFF_PLANE = 2e-4  # of a facet's size: twice what a face may be out of plane
+
+
+def align(layout: Layout, facets: Facets) -> tuple[Facets, Layout]:
+    """The display with the layout's rasters, and the layout with one row per facet of the display.
+
+    The layout's rasters are authoritative: they say which pixels exist. Disabled facets get page −1.
+
+    Returns:
+        facets with `origin`, `du`, `dv`, `size` and `mirrored` of the layout, and the layout with
+        `facet` = 1 … F.
+
+    Raises:
+        LayoutError: made for other geometry, an unknown facet, an enabled facet without a place, or
+            a raster that does not lie on its facet; all that is found, together.
+    """
+    raise_all(LayoutError, _strangers(layout, facets))
+    raise_all(LayoutError, _misfits(layout, facets))
+    row = np.full(facets.count, -1)
+    row[layout.facet - 1] = np.arange(layout.facet.size)
+    known = row >= 0
+    origin, du, dv = (_taken(new, old, row) for new, old in _rasters(layout, facets))
+    facing = dot(cross(dv, du), facets.normal)
+    placed = replace(
+        facets,
+        origin=origin,
+        du=du,
+        dv=dv,
+        size=np.where(known[:, None], layout.size[row], facets.size).astype(np.int32),
+        mirrored=np.where(known, facing < 0, facets.mirrored),
+    )
+    whole = replace(
+        layout,
+        facet=np.arange(1, facets.count + 1, dtype=np.int32),
+        page=np.where(known & facets.enabled, layout.page[row], -1).astype(np.int32),
+        size=placed.size,
+        quilt_from_facet=np.where(known[:, None, None], layout.quilt_from_facet[row], np.eye(2, 3)),
+        origin=origin,
+        du=du,
+        dv=dv,
+        corner_start=facets.corner_start,
+        polygon=_polygons(layout, placed, row),
+        file_row=None if layout.file_row is None else np.where(known, layout.file_row[row], 0),
+    )
+    return placed, whole
+
+
+def _rasters(layout: Layout, facets: Facets) -> Iterator[tuple[FloatArray, FloatArray]]:
+    yield layout.origin, facets.origin
+    yield layout.du, facets.du
+    yield layout.dv, facets.dv
+
+
+def _taken(new: FloatArray, old: FloatArray, row: IntArray) -> FloatArray:
+    result: FloatArray = np.where((row >= 0)[:, None], new[row], old)
+    return result
+
+
+def _polygons(layout: Layout, facets: Facets, row: IntArray) -> FloatArray:
+    """Corners in facet pixels: the layout's where it has the facet, the display's otherwise."""
+    corners = corner_pixels(facets)
+    for facet in np.flatnonzero(row >= 0):
+        start = layout.corner_start[row[facet]]
+        stop = layout.corner_start[row[facet] + 1]
+        corners[facets.corner_start[facet] : facets.corner_start[facet + 1]] = layout.polygon[start:stop]
+    return corners
+
+
+def _strangers(layout: Layout, facets: Facets) -> Iterator[Problem]:
+    """What shows that the layout belongs to another display."""
+    if layout.display_sha256 and layout.display_sha256 != facets.sha256:
+        yield layout.problem(
+            f"made for other geometry: found the hash {layout.display_sha256[:12]}…, but {facets.path}"
+            f" has {facets.sha256[:12]}…; run quilt pack again",
+            key="display_sha256",
+        )
+    known = np.zeros(facets.count, dtype=bool)
+    for row, facet in enumerate(layout.facet):
+        if not 1 <= facet <= facets.count:
+            message = f"facet {facet} is not in {facets.path}, which has facets 1 to {facets.count}"
+            yield layout.problem(message, row, "id")
+        else:
+            known[facet - 1] |= layout.page[row] >= 0
+    for facet in np.flatnonzero(facets.enabled & ~known):
+        name = f" ({facets.names[facet]})" if facets.names[facet] else ""
+        message = f"facet {facet + 1}{name} of {facets.path} has no place; pack again, or disable it"
+        yield layout.problem(message, key="facets")
+
+
+def _misfits(layout: Layout, facets: Facets) -> Iterator[Problem]:
+    """Rasters and polygons that do not lie on the display's facets."""
+    counts, expected = np.diff(layout.corner_start), np.diff(facets.corner_start)[layout.facet - 1]
+    for at in np.flatnonzero(counts != expected):
+        yield layout.problem(
+            f"facet {layout.facet[at]} has {counts[at]} corners, but {expected[at]} in {facets.path}",
+            int(at),
+            "polygon",
+        )
+    if (counts != expected).any():
+        return
+    row, rank = segments(layout.corner_start)
+    i, j = layout.polygon[:, :1], layout.polygon[:, 1:]
+    here = layout.origin[row] + i * layout.du[row] + j * layout.dv[row]
+    there = facets.corners[facets.corner_start[layout.facet - 1][row] + rank]
+    away = np.sqrt(dot(here - there, here - there))
+    extent = np.linalg.norm(layout.du, axis=1) * layout.size[:, 0]
+    extent = np.maximum(extent, np.linalg.norm(layout.dv, axis=1) * layout.size[:, 1])
+    bad = away > _OFF_PLANE * extent[row]
+    for at in np.flatnonzero(bad):
+        if not bad[layout.corner_start[row[at]] : at].any():
+            yield layout.problem(
+                f"facet {layout.facet[row[at]]}: corner {rank[at] + 1} lies {away[at]:.6g} m from where"
+                f" {facets.path} has it; origin, du, dv and polygon must agree with the display",
+                int(row[at]),
+                "origin",
+            )

@@ -1,0 +1,132 @@
+"""The layout file: YAML that people read and every bit of the numbers survives."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from quiltcli.geometry import Int32Array
+from quiltcli.layout.check import check_layout
+from quiltcli.layout.record import Layout
+from quiltcli.wholefile import write_text
+
+if TYPE_CHECKING:
+    from quiltcli.job import LayoutFile
+
+
+def read_layout(path: str | Path) -> Layout:
+    """Read a layout file strictly.
+
+    Raises:
+        JobError: the YAML is broken or a key is wrong, all problems together.
+        LayoutError: the layout makes no sense: `check_layout` says what is looked at.
+    """
+    from quiltcli.job import load_layout_file
+
+    layout = layout_from_file(load_layout_file(Path(path)))
+    check_layout(layout)
+    return layout
+
+
+def layout_from_file(spec: LayoutFile) -> Layout:
+    """The record of a validated layout file, facets sorted by id."""
+    order = sorted(range(len(spec.facets)), key=lambda row: (spec.facets[row].id, row))
+    facets = [spec.facets[row] for row in order]
+    corners = [corner for facet in facets for corner in facet.polygon]
+    return Layout(
+        facet=_whole(facet.id for facet in facets),
+        page=_whole(facet.page - 1 for facet in facets),
+        size=_whole(facet.size for facet in facets),
+        quilt_from_facet=np.array([facet.quilt_from_facet for facet in facets], dtype=np.float64),
+        origin=np.array([facet.origin for facet in facets], dtype=np.float64),
+        du=np.array([facet.du for facet in facets], dtype=np.float64),
+        dv=np.array([facet.dv for facet in facets], dtype=np.float64),
+        corner_start=np.cumsum([0, *(len(facet.polygon) for facet in facets)]),
+        polygon=np.array(corners, dtype=np.float64),
+        pages=_whole(page.size for page in spec.pages),
+        padding=spec.padding,
+        method=spec.method,
+        display=os.path.normpath(spec.display) if spec.display else "",
+        display_sha256=spec.display_sha256 or "",
+        path=str(spec.source.path),
+        place=spec.source,
+        file_row=np.array(order, dtype=np.int64),
+    )
+
+
+def _whole(values: Iterable[object]) -> Int32Array:
+    return np.array(list(values), dtype=np.int32)
+
+
+def write_layout(layout: Layout, path: str | Path) -> None:
+    """Write the layout file, whole or not at all.
+
+    The display is named relative to the file's folder, so that the two can move together.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    path = Path(path)
+    write_text(path, layout_text(layout, path.parent))
+
+
+def layout_text(layout: Layout, folder: str | Path = ".") -> str:
+    """The layout file's text, as it would be written to `folder`.
+
+    Facets without a place are left out. Numbers are the shortest text that reads back as the same float64.
+    """
+    lines = [
+        "quilt_layout: 1",
+        *_display_lines(layout, folder),
+        f"method: {json.dumps(layout.method, ensure_ascii=False)}",
+        f"padding: {layout.padding}",
+        "pages:",
+        *(f"- size: {_flow(size)}" for size in layout.pages),
+        "facets:" if (layout.page >= 0).any() else "facets: []",
+    ]
+    for row in np.flatnonzero(layout.page >= 0):
+        lines += _facet_lines(layout, int(row))
+    return "\n".join(lines) + "\n"
+
+
+def _display_lines(layout: Layout, folder: str | Path) -> Iterator[str]:
+    if layout.display:
+        display = Path(os.path.relpath(layout.display, folder)).as_posix()
+        yield f"display: {json.dumps(display, ensure_ascii=False)}"
+    if layout.display_sha256:
+        yield f"display_sha256: {layout.display_sha256}"
+
+
+def _facet_lines(layout: Layout, row: int) -> list[str]:
+    polygon = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    return [
+        f"- id: {layout.facet[row]}",
+        f"  page: {layout.page[row] + 1}",
+        f"  size: {_flow(layout.size[row])}",
+        f"  quilt_from_facet: {_flow(layout.quilt_from_facet[row])}",
+        f"  origin: {_flow(layout.origin[row])}",
+        f"  du: {_flow(layout.du[row])}",
+        f"  dv: {_flow(layout.dv[row])}",
+        f"  polygon: {_flow(polygon)}",
+    ]
+
+
+def _flow(values: np.ndarray) -> str:
+    """Numbers as a YAML flow sequence, nested like the array."""
+    if values.ndim == 0:
+        return _number(float(values))
+    return "[" + ", ".join(_flow(value) for value in values) + "]"
+
+
+def _number(value: float) -> str:
+    """The shortest text a YAML 1.1 or 1.2 reader takes for exactly this number."""
+    if value.is_integer() and abs(value) < 2**53 and str(value) != "-0.0":
+        return str(int(value))
+    text = repr(value)
+    # YAML 1.1 takes 1e-05 for a word; with a point it is a number.
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text

@@ -1,0 +1,153 @@
+"""Who owns each quilt pixel: a facet, a facet's bleed, or nobody."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quiltcli.errors import LayoutError
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, segments
+from quiltcli.layout.record import Layout, quilt_polygons
+from quiltcli.layout.spans import Spans, facet_spans, overlaps, snapped
+
+Owners: TypeAlias = NDArray[np.int16] | NDArray[np.int32]
+_BATCH = 1_000_000  # candidate pixels looked at together: bounds the memory, not the result
+
+
+def pixel_owners(layout: Layout, bleed: float = 0) -> Owners:
+    """Owner of every pixel of every page, in one flat array.
+
+    Args:
+        layout: a layout whose facets do not overlap.
+        bleed: distance in quilt pixels up to which pixels around a polygon are its bleed.
+
+    Returns:
+        (page_offset[-1],) int16, or int32 from 32767 facets on: the facet's id where the pixel's
+        centre lies inside its polygon, minus the id where it lies within `bleed` of the polygon and
+        inside none, 0 elsewhere. A bleed pixel within reach of several goes to the nearest polygon
+        on its page, the lowest id among equals.
+
+    Raises:
+        LayoutError: two facets claim one pixel.
+    """
+    spans = facet_spans(layout)
+    if overlaps(spans):
+        raise LayoutError(layout.problem("facets overlap in the quilt"))
+    owners = _fill_runs(layout, spans)
+    if bleed > 0:
+        _add_bleed(layout, owners, bleed)
+    return owners
+
+
+def _fill_runs(layout: Layout, spans: Spans) -> Owners:
+    """Facet ids inside the runs, 0 between them: runs and gaps in turn, each repeated to its length."""
+    small = layout.facet.max(initial=0) < np.iinfo(np.int16).max
+    ends = np.zeros(2 * spans.start.size + 2, dtype=np.int64)
+    ends[1:-1:2], ends[2:-1:2], ends[-1] = spans.start, spans.stop, layout.page_offset[-1]
+    values = np.zeros(ends.size - 1, dtype=np.int32)
+    values[1::2] = layout.facet[spans.row]
+    if small:
+        return np.repeat(values.astype(np.int16), np.diff(ends))
+    return np.repeat(values, np.diff(ends))
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """Polygon edges from `a` to `b` (E, 2) in page pixels, and where their facets live."""
+
+    a: FloatArray
+    b: FloatArray
+    facet: Int32Array
+    address: IntArray  # of the page's first pixel
+    page: Int32Array  # (E, 2) width and height of the page
+
+
+def _edges(layout: Layout) -> _Edges:
+    row, _ = segments(layout.corner_start)
+    a = snapped(quilt_polygons(layout))
+    placed = layout.page[row] >= 0
+    b, row, a = a[next_in_row(layout.corner_start)][placed], row[placed], a[placed]
+    page = layout.page[row]
+    return _Edges(a, b, layout.facet[row], layout.page_offset[page], layout.pages[page])
+
+
+def _add_bleed(layout: Layout, owners: Owners, bleed: float) -> None:
+    """Give every free pixel within `bleed` of an edge to the nearest facet, in place.
+
+    A point outside a polygon is as far from it as from its nearest edge, so edges are enough.
+    """
+    edges = _edges(layout)
+    length = np.abs(edges.b - edges.a).max(axis=1, initial=0) + 2 * bleed + 2
+    cost = np.cumsum(np.ceil(length * (2 * bleed + 2)))
+    found = []
+    batch = 0
+    while batch < cost.size:
+        done = cost[batch - 1] if batch else 0.0
+        end = max(batch + 1, int(np.searchsorted(cost, done + _BATCH)))
+        found.append(_nearest(*_candidates(edges, slice(batch, end), owners, bleed)))
+        batch = end
+    if found:
+        address, _, facet = _nearest(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        owners[address] = -facet
+
+
+def _candidates(
+    edges: _Edges, batch: slice, owners: Owners, bleed: float
+) -> tuple[IntArray, FloatArray, Int32Array]:
+    """Free pixels within `bleed` of the edges of a batch: address, squared distance, facet id."""
+    a, b, page = edges.a[batch], edges.b[batch], edges.page[batch]
+    top = np.clip(np.ceil(np.minimum(a[:, 1], b[:, 1]) - bleed - 0.5), 0, page[:, 1])
+    bottom = np.clip(np.floor(np.maximum(a[:, 1], b[:, 1]) + bleed - 0.5) + 1, top, page[:, 1])
+    edge, rank = segments(np.concatenate(([0], np.cumsum((bottom - top).astype(np.int64)))))
+    y: FloatArray = top[edge] + rank
+    left, right = _reach(a[edge], b[edge], y + 0.5, bleed, page[edge, 0])
+    line, rank = segments(np.concatenate(([0], np.cumsum((right - left).astype(np.int64)))))
+    edge, x, y = edge[line], left[line] + rank, y[line]
+    address = edges.address[batch][edge] + (y * page[edge, 0] + x).astype(np.int64)
+    free = owners[address] == 0
+    edge, address = edge[free], address[free]
+    centre = np.stack((x[free] + 0.5, y[free] + 0.5), axis=1)
+    distance2 = _distance2(centre, a[edge], b[edge])
+    near = distance2 <= bleed * bleed
+    return address[near], distance2[near], edges.facet[batch][edge[near]]
+
+
+def _reach(
+    a: FloatArray, b: FloatArray, y: FloatArray, bleed: float, width: Int32Array
+) -> tuple[FloatArray, FloatArray]:
+    """Pixels [left, right) on rows of centres at `y` that can be within `bleed` of segments a to b."""
+    rise = b[:, 1] - a[:, 1]
+    flat = rise == 0
+    rise = np.where(flat, 1.0, rise)
+    t = (np.stack((y - bleed, y + bleed)) - a[:, 1]) / rise
+    t = np.clip(np.where(flat, [[0.0], [1.0]], t), 0, 1)
+    x = a[:, 0] + t * (b[:, 0] - a[:, 0])
+    # Half a pixel more than needed forgives the rounding of x; the distance decides.
+    left = np.clip(np.floor(x.min(axis=0) - bleed - 0.5), 0, width)
+    return left, np.clip(np.ceil(x.max(axis=0) + bleed + 0.5), left, width)
+
+
+def _distance2(point: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Squared distance (N,) of points to the segments a to b, all (N, 2)."""
+    run, away = b - a, point - a
+    length2 = (run * run).sum(axis=1)
+    along = (away * run).sum(axis=1)
+    t = np.clip(np.divide(along, length2, out=np.zeros_like(along), where=length2 > 0), 0, 1)
+    rest = away - t[:, None] * run
+    result: FloatArray = (rest * rest).sum(axis=1)
+    return result
+
+
+def _nearest(
+    address: IntArray, distance2: FloatArray, facet: Int32Array
+) -> tuple[IntArray, FloatArray, Int32Array]:
+    """The nearest facet of every address that occurs, the lowest id among equals."""
+    order = np.lexsort((facet, distance2, address))
+    sorted_address = address[order]
+    first = np.ones(order.size, dtype=bool)
+    first[1:] = sorted_address[1:] != sorted_address[:-1]
+    order = order[first]
+    return address[order], distance2[order], facet[order]

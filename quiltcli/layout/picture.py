@@ -1,0 +1,83 @@
+"""The picture of a layout: a PNG to look at, or an SVG to zoom into."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from quiltcli.errors import OutputError, Problem
+from quiltcli.layout.drawing import PAPER, Drawing, Label, Shape, draw_layout
+from quiltcli.layout.record import Layout
+from quiltcli.wholefile import whole_file, write_text
+
+_FINER = 2  # drawn this much larger, then reduced: smooth edges
+
+
+def layout_picture(layout: Layout, path: str | Path, names: Sequence[str] = ()) -> None:
+    """Draw the layout with facet ids, names and fill figures, at most 2048 pixels wide and high.
+
+    The small triangle in a facet points to where its image's top is.
+
+    Args:
+        layout: a layout that `check_layout` accepts.
+        path: a file name that ends in .png or .svg.
+        names: names of the facets by id; empty strings are not drawn.
+
+    Raises:
+        OutputError: another ending, or the file cannot be written.
+    """
+    path = Path(path)
+    drawing = draw_layout(layout, names)
+    if path.suffix.lower() == ".svg":
+        write_text(path, svg_text(drawing))
+    elif path.suffix.lower() == ".png":
+        _write_png(drawing, path)
+    else:
+        raise OutputError(Problem("a picture's name must end in .png or .svg", file=str(path)))
+
+
+def svg_text(drawing: Drawing) -> str:
+    """The drawing as an SVG document."""
+    size = f'width="{drawing.width}" height="{drawing.height}"'
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {drawing.width} {drawing.height}"'
+        ' font-family="sans-serif">',
+        f'<rect {size} fill="{PAPER}"/>',
+        *(_svg_shape(item) if isinstance(item, Shape) else _svg_label(item) for item in drawing.items),
+        "</svg>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _svg_shape(shape: Shape) -> str:
+    points = " ".join(f"{x:.2f},{y:.2f}" for x, y in shape.points)
+    stroke = f' stroke="{shape.outline}" stroke-width="{shape.width:g}"' if shape.width else ""
+    return f'<polygon points="{points}" fill="{shape.fill}"{stroke} stroke-linejoin="round"/>'
+
+
+def _svg_label(label: Label) -> str:
+    place = f'x="{label.x:.2f}" y="{label.y:.2f}" font-size="{label.size:.1f}" fill="{label.color}"'
+    return (
+        f'<text {place} text-anchor="{label.anchor}" dominant-baseline="central">{escape(label.text)}</text>'
+    )
+
+
+def _write_png(drawing: Drawing, path: Path) -> None:
+    from PIL import Image, ImageDraw, ImageFont
+
+    image = Image.new("RGB", (drawing.width * _FINER, drawing.height * _FINER), PAPER)
+    pen = ImageDraw.Draw(image)
+    for item in drawing.items:
+        if isinstance(item, Label):
+            font = ImageFont.load_default(item.size * _FINER)
+            anchor = "mm" if item.anchor == "middle" else "lm"
+            pen.text((item.x * _FINER, item.y * _FINER), item.text, item.color, font, anchor)
+            continue
+        points = [(x * _FINER, y * _FINER) for x, y in item.points]
+        pen.polygon(points, fill=item.fill)
+        if item.width:
+            pen.line([*points, points[0]], item.outline, round(item.width * _FINER), joint="curve")
+    small = image.resize((drawing.width, drawing.height), Image.Resampling.BOX)
+    with whole_file(path) as temporary:
+        small.save(temporary, format="PNG")

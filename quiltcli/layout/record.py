@@ -1,0 +1,121 @@
+"""The layout record: where each facet's pixels lie in the quilt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from quiltcli.errors import Problem
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
+
+PIXEL_TOLERANCE = 0.01
+"""Pixels by which corners may miss: texture coordinates of six digits, on an 8192 canvas, miss by this."""
+
+
+class Place(Protocol):
+    """Something that can say where in a file a key stands."""
+
+    def problem(self, key: Sequence[str | int], message: str) -> Problem:
+        """A problem with file, line, column and key filled in."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Places of F facets on the pages of a quilt.
+
+    All pages lie in one flat pixel address space: pixel (x, y) of page g has the address
+    `page_offset[g] + y·W + x`.
+
+    Attributes:
+        facet: (F,) facet ids, 1-based, ascending.
+        page: (F,) 0-based page, −1 for a facet that has no place in the quilt.
+        size: (F, 2) facet raster width and height, pixels.
+        quilt_from_facet: (F, 2, 3) affine maps from facet pixels to pixels of the page.
+        origin: (F, 3) world position of the raster's top-left corner, metres.
+        du: (F, 3) world step to the next facet pixel right, metres.
+        dv: (F, 3) world step to the next facet pixel down, metres.
+        corner_start: (F+1,) offsets into `polygon`.
+        polygon: (C, 2) corners in facet pixels.
+        pages: (G, 2) page width and height, pixels.
+        padding: pixels kept free between facets.
+        method: name of the packing method, `manual` when made by hand.
+        display: the display file the layout was made for.
+        display_sha256: hash of that display's geometry.
+        path: the layout file it was read from, empty when it was made by the program.
+        place: finds lines in that file, None when it was made by the program.
+        file_row: (F,) row of each facet in the file, None when it was made by the program.
+    """
+
+    facet: Int32Array
+    page: Int32Array
+    size: Int32Array
+    quilt_from_facet: FloatArray
+    origin: FloatArray
+    du: FloatArray
+    dv: FloatArray
+    corner_start: IntArray
+    polygon: FloatArray
+    pages: Int32Array
+    padding: int
+    method: str
+    display: str
+    display_sha256: str
+    path: str = ""
+    place: Place | None = field(default=None, repr=False)
+    file_row: IntArray | None = field(default=None, repr=False)
+
+    @property
+    def page_offset(self) -> IntArray:
+        """Flat address (G+1,) of every page's first pixel; the last entry is the pixel count."""
+        pixels = self.pages[:, 0].astype(np.int64) * self.pages[:, 1]
+        return np.concatenate(([0], np.cumsum(pixels)))
+
+    def problem(self, message: str, row: int = -1, key: str = "") -> Problem:
+        """A problem with this layout, told with the line it stands on when that is known.
+
+        Args:
+            message: what is wrong; it must name the facet by itself.
+            row: row of the arrays, −1 when no single facet is at fault.
+            key: the key inside the facet's entry, or of the whole file.
+        """
+        if self.place is None or self.file_row is None:
+            return Problem(message, file=self.path or self.display)
+        path: list[str | int] = [] if row < 0 else ["facets", int(self.file_row[row])]
+        return self.place.problem([*path, key] if key else path, message)
+
+
+def quilt_polygons(layout: Layout) -> FloatArray:
+    """Corners (C, 2) of all facets in pixels of their pages."""
+    row, _ = segments(layout.corner_start)
+    maps = layout.quilt_from_facet[row]
+    x, y = layout.polygon[:, 0], layout.polygon[:, 1]
+    # Summed from the left: a whole-pixel map then adds its offset last, in one rounding.
+    result: FloatArray = maps[:, :, 0] * x[:, None] + maps[:, :, 1] * y[:, None] + maps[:, :, 2]
+    return result
+
+
+def whole_pixel(layout: Layout) -> BoolArray:
+    """Facets (F,) whose map is a whole-pixel translation with quarter turns, and perhaps a mirror.
+
+    Their images are copied to and from the quilt pixel by pixel, never resampled.
+    """
+    linear, offset = layout.quilt_from_facet[:, :, :2], layout.quilt_from_facet[:, :, 2]
+    units = (np.abs(linear) == 1).sum(axis=(1, 2)) == 2
+    square = (np.abs(linear).sum(axis=1) == 1).all(axis=1) & (np.abs(linear).sum(axis=2) == 1).all(axis=1)
+    result: BoolArray = units & square & (offset == np.rint(offset)).all(axis=1)
+    return result
+
+
+def facet_pixels_inside_page(layout: Layout) -> BoolArray:
+    """Facets (F,) whose whole raster, not only its polygon, lies on their page."""
+    corners = np.zeros((layout.facet.size, 4, 2))
+    corners[:, 1:3, 0] = layout.size[:, :1]
+    corners[:, 2:, 1] = layout.size[:, 1:]
+    maps = layout.quilt_from_facet
+    placed = np.einsum("fij,fkj->fki", maps[:, :, :2], corners) + maps[:, None, :, 2]
+    limit = layout.pages[layout.page][:, None, :]
+    result: BoolArray = ((placed >= 0) & (placed <= limit)).all(axis=(1, 2)) | (layout.page < 0)
+    return result

@@ -1,0 +1,56 @@
+"""The page size when nobody asks for one: a single page, nearly square, as small as can be found."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from quiltcli.packing.model import Method, PackInput, PackResult, page_count, placed_size
+
+LARGEST_PAGE = 16384
+"""Pixels that GPUs and media servers take in one direction."""
+
+_MULTIPLE = 16  # video codecs like whole macroblocks
+_WIDTHS = 24
+_EFFORT = 8000  # facets placed in all tries together
+
+
+def pack_auto(method: Method, wanted: PackInput) -> tuple[PackResult, tuple[int, int]]:
+    """Try a range of page widths and keep the smallest page; ties go to the squarest, then narrowest.
+
+    Pages are at most 16384 pixels wide and high; a display too large for one is packed on several
+    of that size.
+    """
+    best: tuple[tuple[int, int, int], PackResult, tuple[int, int]] | None = None
+    for width in _widths(wanted):
+        result = method(replace(wanted, page=(width, LARGEST_PAGE)))
+        if page_count(result) > 1:
+            continue
+        used = (result.corner + placed_size(wanted.size, result.turn)).max(axis=0)
+        w, h = (min(_rounded(int(side)), LARGEST_PAGE) for side in used)
+        cost = (w * h, abs(w - h), w)
+        if best is None or cost < best[0]:
+            best = (cost, result, (w, h))
+    if best is not None:
+        return best[1], best[2]
+    page = (LARGEST_PAGE, LARGEST_PAGE)
+    return method(replace(wanted, page=page)), page
+
+
+def _rounded(pixels: int) -> int:
+    return math.ceil(pixels / _MULTIPLE) * _MULTIPLE
+
+
+def _widths(wanted: PackInput) -> list[int]:
+    """Page widths from 0.8 to 1.4 times the side of a square of the facets' area, each once, ascending.
+
+    Large displays get fewer tries: their pages fill about as well at any width.
+    """
+    area = float((wanted.size + wanted.padding).astype(np.int64).prod(axis=1).sum())
+    narrowest = int(wanted.size.min(axis=1).max())
+    tries = max(3, min(_WIDTHS, _EFFORT // len(wanted.size)))
+    sides = math.sqrt(area) * np.linspace(0.8, 1.4, tries)
+    widths = {_rounded(max(int(side), narrowest)) for side in sides}
+    return sorted(width for width in widths if width <= LARGEST_PAGE) or [LARGEST_PAGE]
