@@ -113,7 +113,7 @@ def _with_normals(
     vertices: FloatArray, triangles: IntArray, given: FloatArray, crease_deg: float, *, keep_sources: bool
 ) -> tuple[IntArray, IntArray, Float32Array]:
     """Source vertex (V,), triangles (T, 3) and normals (V, 3): the given ones, computed ones for the rest."""
-    usable: BoolArray = given.any(axis=1)
+    usable = dot(given, given) > 0
     has_own = usable[triangles].all(axis=1)
     own, other = np.flatnonzero(has_own), np.flatnonzero(~has_own)
     used, corners = _compact(triangles[own], len(vertices))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array
+import numpy as np
+
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, cross, normalized
 
 
 @dataclass(frozen=True)
@@ -78,3 +81,31 @@ class Scene:
     lights: Lights
     background: Float32Array
     notices: tuple[str, ...]
+
+    @cached_property
+    def corner_normals(self) -> Float32Array:
+        """What shading needs of a triangle's directions, side by side for one look-up (T, 12).
+
+        The first corner's normal, what to add to it for the second and the third corner, and the
+        triangle's own unit normal. Flat triangles have their own normal at all corners.
+        """
+        table = np.empty((len(self.triangles), 12), dtype=np.float32)
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        own = normalized(cross(b - a, c - a)).astype(np.float32)
+        table[:, 0:9] = _corner_table(self.normals, self.triangles)
+        table[:, 9:12] = own
+        flat = np.flatnonzero(self.flat)
+        table[flat, 0:3] = own[flat]
+        table[flat, 3:9] = 0.0
+        return table
+
+    @cached_property
+    def corner_colors(self) -> Float32Array | None:
+        """The first corner's colour, and what to add for the others (T, 9); None where all are 1."""
+        return None if bool((self.colors == 1).all()) else _corner_table(self.colors, self.triangles)
+
+
+def _corner_table(values: Float32Array, triangles: Int32Array) -> Float32Array:
+    """Values (T, 9) at the first corner, and the second's and third's difference from it."""
+    first = values[triangles[:, 0]]
+    return np.hstack((first, values[triangles[:, 1]] - first, values[triangles[:, 2]] - first))
