@@ -143,7 +143,7 @@ def read_parts(path: Path) -> tuple[Image, ...]:
     """Read every part of an EXR file, in file order.
 
     Raises:
-        OutputError: the file is missing, truncated, damaged or no flat OpenEXR image.
+        OutputError: the file is missing, truncated, damaged, subsampled or no flat OpenEXR image.
     """
     headers = _read_headers(path)
     # `with` would empty the parts: the arrays are handed over by the library, not shared with it.
@@ -151,7 +151,10 @@ def read_parts(path: Path) -> tuple[Image, ...]:
     if len(parts) != len(headers):
         wrong = f"is damaged: {len(parts)} of {len(headers)} parts can be read"
         raise OutputError(Problem(wrong, file=str(path)))
-    return tuple(_image(part.header, part.channels) for part in parts)
+    images = tuple(_image(part.header, part.channels) for part in parts)
+    if any(len({channel.shape for channel in image.channels.values()}) > 1 for image in images):
+        raise OutputError(Problem("has subsampled channels, expected all of one size", file=str(path)))
+    return images
 
 
 def read_exr(path: Path) -> Image:
