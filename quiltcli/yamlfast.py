@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from yaml.cyaml import CParser
 
-from quiltcli.yamlfile import CoreResolver
+from quiltcli.yamlsyntax import CoreResolver
 
 
 class FastLoader(CParser, CoreResolver):

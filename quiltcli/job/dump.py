@@ -16,7 +16,7 @@ from yaml.serializer import Serializer
 from quiltcli.frames import format_frames
 from quiltcli.job.base import Model
 from quiltcli.job.render import JobFile
-from quiltcli.yamlfile import CoreResolver
+from quiltcli.yamlsyntax import CoreResolver
 
 
 class _Dumper(Emitter, Serializer, SafeRepresenter, CoreResolver):
@@ -25,8 +25,8 @@ class _Dumper(Emitter, Serializer, SafeRepresenter, CoreResolver):
     def __init__(self, stream: Any, **options: Any) -> None:
         Emitter.__init__(self, stream, width=options.get("width"), allow_unicode=True)
         Serializer.__init__(self)
-        SafeRepresenter.__init__(self, sort_keys=False)
-        self.default_flow_style = None  # short lists in one line, the rest in blocks
+        # None puts lists of plain values in one line and all else in blocks.
+        SafeRepresenter.__init__(self, default_flow_style=None, sort_keys=False)  # type: ignore[arg-type]
         CoreResolver.__init__(self)
 
     def ignore_aliases(self, data: Any) -> bool:

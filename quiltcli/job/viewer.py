@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
 from quiltcli.errors import JobError
 from quiltcli.frames import parse_frames
@@ -174,6 +174,14 @@ class PathSpec(Model):
     """A circle."""
     csv: Annotated[CsvSpec, BeforeValidator(_csv)] | None = None
     """A recorded path: a file name, or a mapping with `file`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_interpolation(cls, value: Any) -> Any:
+        """Only keyframes are interpolated: the default belongs to them alone."""
+        if isinstance(value, dict) and value.get("keyframes") is not None:
+            return {"interpolation": "linear", **value}
+        return value
 
     def cross_checks(self) -> Iterator[Complaint]:
         """One kind, keyframes apart in time, all aimed the same way."""

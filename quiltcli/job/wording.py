@@ -101,16 +101,13 @@ def _whole(value: Any, ctx: dict[str, Any]) -> str:
 def _number_hint(text: str) -> str:
     """Help for text that was meant as a number."""
     plain = text.replace("_", "").replace(" ", "")
-    for candidate, hint in (
-        (text, "without quotes"),
-        (plain, "without separators"),
-        (text.replace(",", "."), ""),
-    ):
+    quoted = (text, " without quotes") if "_" not in text else (plain, "")
+    for candidate, hint in (quoted, (plain, ""), (text.replace(",", "."), "")):
         try:
             float(candidate)
         except ValueError:
             continue
-        return f" (write {shorten(candidate.strip())}{' ' + hint if hint else ''})"
+        return f" (write {shorten(candidate.strip())}{hint})"
     return ""
 
 

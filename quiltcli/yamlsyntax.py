@@ -1,0 +1,143 @@
+"""YAML text to nodes: the scalars of YAML 1.2, and syntax errors in words that help.
+
+Scalars follow the YAML 1.2 core schema, whatever PyYAML does by default: `1e3` is a number, only
+`true` and `false` are booleans, `1:30` and `2024-01-01` are text.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+from yaml.composer import Composer
+from yaml.parser import Parser
+from yaml.reader import Reader, ReaderError
+from yaml.resolver import BaseResolver
+from yaml.scanner import Scanner
+
+from quiltcli.errors import JobError, Problem
+
+CORE = "tag:yaml.org,2002:"
+
+
+class CoreResolver(BaseResolver):
+    """Plain scalars become what YAML 1.2's core schema says (https://yaml.org/spec/1.2.2/#103-core-schema)."""
+
+
+for _tag, _pattern, _first in (
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", list("-+0123456789")),
+    (
+        "float",
+        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+        list("-+.0123456789"),
+    ),
+    ("merge", r"<<", ["<"]),
+):
+    CoreResolver.add_implicit_resolver(CORE + _tag, re.compile(rf"(?:{_pattern})\Z"), _first)
+
+
+class _Loader(Reader, Scanner, Parser, Composer, CoreResolver):
+    """The reader in Python, whose error messages are the same everywhere."""
+
+    def __init__(self, text: str) -> None:
+        Reader.__init__(self, text)
+        Scanner.__init__(self)
+        Parser.__init__(self)
+        Composer.__init__(self)
+        CoreResolver.__init__(self)
+
+
+def read_text(path: Path) -> str:
+    """Text of a UTF-8 file.
+
+    Raises:
+        JobError: the file is missing, a directory, unreadable or not UTF-8.
+    """
+    try:
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise JobError(Problem("no such file", str(path))) from None
+    except IsADirectoryError:
+        raise JobError(Problem("is a directory (a file was expected)", str(path))) from None
+    except OSError as error:
+        raise JobError(Problem(f"cannot be read: {error.strerror or error}", str(path))) from None
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = raw[: error.start].decode("utf-8", "replace")
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        text = (
+            f"not UTF-8 text: byte 0x{raw[error.start]:02x} at offset {error.start} (save the file as UTF-8)"
+        )
+        raise JobError(Problem(text, str(path), line, column)) from None
+
+
+def compose(text: str, path: Path) -> yaml.Node | None:
+    """Node tree of a single document, by libyaml where there is one."""
+    try:
+        return _fast_compose(text)
+    except yaml.YAMLError:
+        pass
+    try:
+        return _Loader(text).get_single_node()
+    except RecursionError:
+        raise JobError(Problem("the values are nested too deeply", str(path))) from None
+    except yaml.YAMLError as error:
+        raise JobError(_syntax_problem(error, text, str(path) if path.name else "")) from None
+
+
+def _fast_compose(text: str) -> yaml.Node | None:
+    """The same nodes some four times faster; its error messages are not ours."""
+    if not yaml.__with_libyaml__ or _is_deep(text):
+        return _Loader(text).get_single_node()
+    from quiltcli.yamlfast import FastLoader
+
+    return FastLoader(text).get_single_node()
+
+
+def _is_deep(text: str) -> bool:
+    """Whether nesting may be so deep that libyaml, which recurses in C, would run out of stack."""
+    depth = deepest = 0
+    for bracket in re.findall(r"[\[{\]}]", text):
+        depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+        deepest = max(deepest, depth)
+    return deepest > 200 or re.search(r"^[ ?-]{400}", text, re.MULTILINE) is not None
+
+
+def _syntax_problem(error: yaml.YAMLError, text: str, file: str) -> Problem:
+    """What PyYAML stumbled over, in words that help."""
+    if isinstance(error, ReaderError):
+        before = text[: error.position]
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        return Problem(
+            f"character U+{ord(text[error.position]):04X} is not allowed in YAML", file, line, column
+        )
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    problem, context = getattr(error, "problem", None), getattr(error, "context", None)
+    if mark is None:
+        return Problem(f"not YAML: {error}", file)
+    line, column = place(mark)
+    if text[mark.index : mark.index + 1] == "\t":
+        return Problem("a tab cannot indent in YAML (use spaces)", file, line, column)
+    words = _HINTS.get(str(problem)) or f"not YAML: {problem}"
+    start = getattr(error, "context_mark", None)
+    if context and start is not None and str(problem) not in _HINTS:
+        words += f" ({context} that starts in line {start.line + 1})"
+    return Problem(words, file, line, column)
+
+
+_HINTS = {
+    "mapping values are not allowed here": "a second ': ' in one line (quote the text, or indent it well)",
+    "could not find expected ':'": "expected 'key: value', found no ':'",
+    "but found another document": "a second document starts here (one file holds one)",
+    "found unexpected end of stream": "the file ends inside a quoted text",
+}
+
+
+def place(mark: Any) -> tuple[int, int]:
+    """1-based line and column of a PyYAML mark."""
+    return mark.line + 1, mark.column + 1
