@@ -96,7 +96,7 @@ def _too_large(facets: Facets, rows: np.ndarray, size: tuple[int, int] | None) -
         w, h = facets.size[row]
         density = 100 * min(limit[0] / sides[at, 0], limit[1] / sides[at, 1])
         yield Problem(
-            f"facet {row + 1}{name} is {w}×{h} pixels, more than a page of {width}×{height} holds, turned or not;"
+            f"facet {row + 1}{name} is {w}×{h} pixels, more than a {width}×{height} page holds turned or not;"
             f" a page of {sides[:, 1].max()}×{sides[:, 0].max()} would, or a density of at most"
             f" {math.floor(density * 10) / 10:g} % of the present one",
             file=facets.path,
