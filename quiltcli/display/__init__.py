@@ -1,0 +1,30 @@
+"""The display: planar facets in world space, each with its own pixel raster."""
+
+from __future__ import annotations
+
+from quiltcli.display.build import build_facets, load_display
+from quiltcli.display.edges import SharedEdges
+from quiltcli.display.facets import (
+    Facets,
+    convex_parts,
+    corner_pixels,
+    facet_from_world,
+    lit_facets,
+    pitch_mm,
+    shared_edges,
+    triangulate,
+)
+
+__all__ = [
+    "Facets",
+    "SharedEdges",
+    "build_facets",
+    "convex_parts",
+    "corner_pixels",
+    "facet_from_world",
+    "lit_facets",
+    "load_display",
+    "pitch_mm",
+    "shared_edges",
+    "triangulate",
+]

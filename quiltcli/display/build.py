@@ -1,0 +1,151 @@
+"""Facets from a mesh and a display file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from quiltcli.display.check import called, check_polygons
+from quiltcli.display.facets import Facets
+from quiltcli.display.frame import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
+from quiltcli.display.polygon import area_vectors
+from quiltcli.errors import DisplayError, Problem
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, dot, normalized
+from quiltcli.job.display import DisplayFile, FacetSpec
+from quiltcli.meshfile import PolygonMesh, read_mesh
+
+_MOST_PROBLEMS = 50
+
+
+def load_display(spec: DisplayFile) -> Facets:
+    """Read the mesh of a display file and make its facets.
+
+    Raises:
+        MeshError: the mesh cannot be read.
+        DisplayError: the mesh or the display file makes no facets; every problem found is in it.
+    """
+    return build_facets(read_mesh(spec.mesh), spec)
+
+
+def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
+    """Make the facets of a display from its mesh, in mesh units, and its file.
+
+    Corners stay where the mesh puts them; the raster lies in the plane through the first corner
+    across Newell's normal, at most the planarity tolerance away from any of them.
+
+    Raises:
+        DisplayError: faces that cannot be facets, facets that do not exist, impossible rasters.
+    """
+    start = mesh.corner_start
+    corners = _in_world(mesh, spec)
+    chosen = [spec.facets.get(facet, FacetSpec()) for facet in range(1, mesh.count + 1)]
+    names = tuple(choice.name or name for choice, name in zip(chosen, mesh.names, strict=True))
+    _raise(
+        [*_unknown_facets(mesh.count, spec), *check_polygons(corners, start, names, mesh.lines, mesh.path)],
+        spec,
+    )
+    front = normalized(area_vectors(corners, start))
+    normal = -front if spec.viewing_side == "back" else front
+    _raise(list(_useless_ups(normal, names, spec)), spec)
+    right, down = _axes(corners, start, front, normal, spec)
+    mirrored = np.array([choice.mirror for choice in chosen])
+    right = np.where(mirrored[:, None], -right, right)
+    frame = _rasters(corners, start, right, down, spec)
+    _raise(list(_impossible_sizes(frame.size, names, spec)), spec)
+    return Facets(
+        names=names,
+        corner_start=start,
+        corners=corners,
+        origin=frame.origin,
+        du=frame.du,
+        dv=frame.dv,
+        size=frame.size,
+        normal=normal,
+        both_sides=spec.viewing_side == "both",
+        enabled=np.array([choice.enabled for choice in chosen]),
+        mirrored=mirrored,
+        uv=mesh.uv,
+        path=str(spec.source.path),
+    )
+
+
+def _in_world(mesh: PolygonMesh, spec: DisplayFile) -> FloatArray:
+    """Corners (C, 3) in world metres, every sum in a fixed order."""
+    corners = mesh.vertices[mesh.corners] * spec.metres
+    if spec.transform is None:
+        return corners
+    matrix = spec.transform.array
+    return np.stack([dot(corners, row[:3]) + row[3] for row in matrix[:3]], axis=1)
+
+
+def _axes(
+    corners: FloatArray, start: IntArray, front: FloatArray, normal: FloatArray, spec: DisplayFile
+) -> tuple[FloatArray, FloatArray]:
+    """Right and down directions (F, 3) with the `up` and `rotate` of single facets."""
+    up = upward(corners, start, front)
+    turns = np.zeros(len(normal), np.int64)
+    for facet, choice in spec.facets.items():
+        turns[facet - 1] = int(choice.rotate) // 90
+        if choice.up is not None:
+            up[facet - 1] = into_plane(np.array([choice.up], np.float64), normal[facet - 1 : facet])[0]
+    right, down = axes(corners, start, normal, normalized(up))
+    return turned(right, down, turns)
+
+
+def _rasters(
+    corners: FloatArray, start: IntArray, right: FloatArray, down: FloatArray, spec: DisplayFile
+) -> Rasters:
+    asked = np.zeros((len(right), 2), np.int32)
+    asked[:] = spec.resolution.facet_pixels or 0
+    for facet, choice in spec.facets.items():
+        if choice.facet_pixels is not None:
+            asked[facet - 1] = choice.facet_pixels
+    return rasters(corners, start, right, down, spec.resolution.pixels_per_metre or 1.0, asked)
+
+
+def _unknown_facets(count: int, spec: DisplayFile) -> Iterator[Problem]:
+    for facet in spec.facets:
+        if facet > count:
+            yield spec.source.problem(
+                ("facets", facet), f"there is no facet {facet} (the mesh has facets 1 to {count})"
+            )
+
+
+def _useless_ups(normal: FloatArray, names: Sequence[str], spec: DisplayFile) -> Iterator[Problem]:
+    """An `up` that stands straight on its facet points nowhere in the image."""
+    for facet, choice in spec.facets.items():
+        if choice.up is None:
+            continue
+        up = normalized(np.array([choice.up], np.float64))
+        lying = into_plane(up, normal[facet - 1 : facet])[0]
+        if float(np.sqrt(dot(lying, lying))) < LEVEL:
+            text = ", ".join(f"{c:g}" for c in choice.up)
+            yield spec.source.problem(
+                ("facets", facet, "up"),
+                f"[{text}] is perpendicular to {called(facet - 1, names)} "
+                "(expected a direction that leans along it by 1 degree or more)",
+            )
+
+
+def _impossible_sizes(size: Int32Array, names: Sequence[str], spec: DisplayFile) -> Iterator[Problem]:
+    for facet in np.flatnonzero(((size < 1) | (size > MOST_PIXELS)).any(axis=1)):
+        width, height = ("less than 1" if n < 1 else f"over {MOST_PIXELS}" if n > MOST_PIXELS else str(n)
+                         for n in size[facet])  # fmt: skip
+        own = spec.facets.get(int(facet) + 1)
+        key = next(name for name in ("facet_pixels", "pixels_per_metre") if getattr(spec.resolution, name))
+        yield spec.source.problem(
+            ("facets", int(facet) + 1, "facet_pixels") if own and own.facet_pixels else ("resolution", key),
+            f"makes {called(int(facet), names)} {width} × {height} pixels "
+            f"(expected 1 to {MOST_PIXELS} a side)",
+        )
+
+
+def _raise(problems: Sequence[Problem], spec: DisplayFile) -> None:
+    """Raise the first problems found together, and the count of the rest."""
+    if not problems:
+        return
+    shown = list(problems[:_MOST_PROBLEMS])
+    if len(problems) > _MOST_PROBLEMS:
+        shown.append(Problem(f"and {len(problems) - _MOST_PROBLEMS} problems more", str(spec.source.path)))
+    raise DisplayError(shown)

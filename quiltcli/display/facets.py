@@ -1,0 +1,165 @@
+"""The facets of a display as arrays, and what follows from them alone."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.display.edges import SharedEdges, find_shared_edges
+from quiltcli.display.polygon import convex, ear_clip, plane_coordinates
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, segments
+
+
+@dataclass(frozen=True)
+class Facets:
+    """The F facets of a display, in mesh face order (facet id = index + 1).
+
+    A facet's raster is W × H pixels in its plane: the continuous facet pixel (i, j) lies at
+    `origin + i·du + j·dv` in the world. Seen from the lit side `du` points right and `dv` down.
+
+    Attributes:
+        names: F names, empty where none was given.
+        corner_start: (F+1,) offsets into `corners`.
+        corners: (C, 3) world metres, in the winding of the mesh face.
+        origin: (F, 3) world position of the raster's top-left corner, metres.
+        du: (F, 3) world step to the next pixel right, metres.
+        dv: (F, 3) world step to the next pixel down, metres.
+        size: (F, 2) raster width and height, pixels.
+        normal: (F, 3) unit normal on the lit side (of the winding's front when both sides are lit).
+        both_sides: whether a facet is lit on both sides.
+        enabled: (F,) facets that take part.
+        mirrored: (F,) facets whose image is mirrored because the user asked for it.
+        uv: (C, 2) texture coordinates of the mesh, v up, or None.
+        path: the display file as the user named it, for messages.
+    """
+
+    names: tuple[str, ...]
+    corner_start: IntArray
+    corners: FloatArray
+    origin: FloatArray
+    du: FloatArray
+    dv: FloatArray
+    size: Int32Array
+    normal: FloatArray
+    both_sides: bool
+    enabled: BoolArray
+    mirrored: BoolArray
+    uv: FloatArray | None
+    path: str
+
+    @property
+    def count(self) -> int:
+        """Number of facets, F."""
+        return len(self.names)
+
+    def polygon(self, facet: int) -> FloatArray:
+        """Corners (n, 3) of the facet with this 0-based index, world metres."""
+        return self.corners[self.corner_start[facet] : self.corner_start[facet + 1]]
+
+    @property
+    def sha256(self) -> str:
+        """Hash of what a layout depends on: corners, rasters and lit sides, in hexadecimal.
+
+        Numbers are rounded to a billionth of a metre first, so that the last bit of a processor's
+        arithmetic does not make it another display.
+        """
+        digest = hashlib.sha256(b"quilt display 1")
+        for whole in (self.corner_start, self.size, np.array([self.both_sides])):
+            digest.update(np.ascontiguousarray(whole, dtype="<i8").tobytes())
+        for exact in (self.corners, self.origin, self.du, self.dv, self.normal):
+            # Adding zero turns −0 into 0.
+            digest.update(np.ascontiguousarray(np.round(exact, 9) + 0.0, dtype="<f8").tobytes())
+        return digest.hexdigest()
+
+
+def lit_facets(facets: Facets, eye: FloatArray) -> BoolArray:
+    """Which facets (F,) show an image to an eye (3,): enabled, and lit on the side it is on.
+
+    An eye in a facet's plane, to a billionth of a metre, sees nothing of it.
+    """
+    height = dot(eye - facets.origin, facets.normal)
+    if facets.both_sides:
+        height = np.abs(height)
+    result: BoolArray = facets.enabled & (height > 1e-9)
+    return result
+
+
+def facet_from_world(facets: Facets) -> FloatArray:
+    """Projective maps (F, 3, 4) from world metres to facet pixels, dropping points onto the plane."""
+    result = np.zeros((facets.count, 3, 4))
+    for row, step in enumerate((facets.du, facets.dv)):
+        direction = step / dot(step, step)[:, None]
+        result[:, row, :3] = direction
+        result[:, row, 3] = -dot(direction, facets.origin)
+    result[:, 2, 3] = 1
+    return result
+
+
+def corner_pixels(facets: Facets) -> FloatArray:
+    """Facet pixel coordinates (C, 2) of all corners."""
+    row, _ = segments(facets.corner_start)
+    local = facets.corners - facets.origin[row]
+    steps = (facets.du, facets.dv)
+    return np.stack([dot(local, step[row]) / dot(step, step)[row] for step in steps], axis=1)
+
+
+def triangulate(facets: Facets) -> tuple[Int32Array, Int32Array]:
+    """Triangles that cover the facets exactly, concave ones too, in the winding of the mesh.
+
+    Returns:
+        triangles (T, 3) int32 indices into `corners`, and facet (T,) int32, 0-based, ascending.
+    """
+    start = facets.corner_start
+    points = plane_coordinates(facets.corners, start)
+    fans = convex(points, start, straight=False)
+    row, rank = segments(start)
+    # Corner k of a fan, but for its first and last, makes the triangle (first, k, k + 1).
+    second = np.flatnonzero(fans[row] & (rank > 0) & (rank < np.diff(start)[row] - 1))
+    triangles = [np.stack((start[row[second]], second, second + 1), axis=1)]
+    owners: list[IntArray] = [row[second]]
+    for cut in np.flatnonzero(~fans).tolist():
+        ears = ear_clip(points[start[cut] : start[cut + 1]])
+        triangles.append(start[cut] + np.array(ears, np.int64).reshape(-1, 3))
+        owners.append(np.full(len(ears), cut))
+    facet = np.concatenate(owners)
+    order = np.argsort(facet, kind="stable")
+    return np.concatenate(triangles)[order].astype(np.int32), facet[order].astype(np.int32)
+
+
+def convex_parts(facets: Facets) -> tuple[Int32Array, IntArray, Int32Array]:
+    """Convex polygons that cover the facets: a convex facet itself, else its triangles.
+
+    Returns:
+        part_facet (K,) int32 0-based facet, ascending; part_start (K+1,) offsets into part_corners;
+        part_corners (M,) int32 indices into `facets.corners`, in the winding of the mesh.
+    """
+    start = facets.corner_start
+    whole = convex(plane_coordinates(facets.corners, start), start)
+    if whole.all():
+        return np.arange(facets.count, dtype=np.int32), start, np.arange(start[-1], dtype=np.int32)
+    triangles, owner = triangulate(facets)
+    cut = ~whole[owner]
+    facet = np.concatenate((np.flatnonzero(whole), owner[cut]))
+    order = np.argsort(facet, kind="stable")
+    count = np.where(whole[facet], np.diff(start)[facet], 3)[order]
+    part_start = np.concatenate((np.zeros(1, np.int64), np.cumsum(count)))
+    pool = np.concatenate((np.arange(start[-1]), triangles[cut].reshape(-1)))
+    begin = np.concatenate((start[:-1][whole], start[-1] + 3 * np.arange(cut.sum())))[order]
+    part, rank = segments(part_start)
+    return facet[order].astype(np.int32), part_start, pool[begin[part] + rank].astype(np.int32)
+
+
+def shared_edges(facets: Facets) -> SharedEdges:
+    """Edges, or pieces of edges, that two facets have in common."""
+    return find_shared_edges(facets.corners, facets.corner_start)
+
+
+def pitch_mm(facets: Facets) -> tuple[float, float]:
+    """Least and greatest distance between neighbouring pixels of the enabled facets, millimetres."""
+    steps = np.concatenate((facets.du[facets.enabled], facets.dv[facets.enabled]))
+    if not len(steps):
+        return 0.0, 0.0
+    pitch = np.sqrt(dot(steps, steps)) * 1000
+    return float(pitch.min()), float(pitch.max())
