@@ -25,17 +25,17 @@ def one(polygon, page=(6, 4), at=(0, 0)):
 
 
 def test_rectangle_owns_its_pixels():
-    assert ["......", ".111..", ".111..", "......"] == picture(one(rectangle(3, 2), at=(1, 1)))
+    assert picture(one(rectangle(3, 2), at=(1, 1))) == ["......", ".111..", ".111..", "......"]
 
 
 def test_centre_on_left_and_top_edge_is_inside_on_right_and_bottom_outside():
     layout = one([[0.5, 0.5], [3.5, 0.5], [3.5, 2.5], [0.5, 2.5]])
-    assert ["111...", "111...", "......", "......"] == picture(layout)
+    assert picture(layout) == ["111...", "111...", "......", "......"]
 
 
 def test_diagonal_through_centres_goes_to_the_polygon_on_its_right():
     low, high = [[0, 0], [4, 4], [0, 4]], [[0, 0], [4, 0], [4, 4]]
-    assert ["2222..", "1222..", "1122..", "1112.."] == picture(tiling([low, high], (6, 4)))
+    assert picture(tiling([low, high], (6, 4))) == ["2222..", "1222..", "1122..", "1112.."]
 
 
 @pytest.mark.parametrize("start", range(4))
@@ -48,35 +48,35 @@ def test_winding_and_first_corner_do_not_matter(start, step):
 
 def test_concave_polygon_leaves_its_notch_free():
     layout = one([[0, 0], [6, 0], [6, 4], [4, 4], [4, 2], [2, 2], [2, 4], [0, 4]])
-    assert ["111111", "111111", "11..11", "11..11"] == picture(layout)
+    assert picture(layout) == ["111111", "111111", "11..11", "11..11"]
 
 
 def test_thin_facet_between_centres_owns_nothing():
-    assert 0 == fill(one([[0.6, 0], [1.4, 0], [1.4, 4], [0.6, 4]]))
+    assert fill(one([[0.6, 0], [1.4, 0], [1.4, 4], [0.6, 4]])) == 0
 
 
 def test_corner_between_two_neighbours_edge_ends_is_claimed_once():
     # Facets 2 and 3 meet in the middle of facet 1's slanted edge, on a pixel centre.
     first = [[0, 0], [1, 0], [6, 5], [6, 6], [0, 6]]
     second, third = [[1, 0], [6, 0], [3.5, 2.5]], [[6, 0], [6, 5], [3.5, 2.5]]
-    assert 1.0 == fill(tiling([first, second, third], (6, 6)))
+    assert fill(tiling([first, second, third], (6, 6))) == 1.0
 
 
 def test_neighbours_agree_though_their_corners_differ_in_the_last_bits():
     nudge = 1e-12
     left, right = [[0, 0], [2.5 + nudge, 0], [2.5 + nudge, 4], [0, 4]], [[2.5, 0], [6, 0], [6, 4], [2.5, 4]]
-    assert ["112222"] * 4 == picture(tiling([left, right], (6, 4)))
+    assert picture(tiling([left, right], (6, 4))) == ["112222"] * 4
 
 
 def test_pages_follow_each_other_and_absent_facets_own_nothing():
     facets = flat_display([rectangle(2, 1)] * 3)
     layout = placed(facets, [moved(0, 0)] * 3, (3, 2), on=[1, 0, -1], pages=2)
-    assert [2, 2, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0] == pixel_owners(layout).tolist()
+    assert pixel_owners(layout).tolist() == [2, 2, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0]
 
 
 def test_polygon_past_the_page_is_cut_off():
     layout = one([[-2, -2], [9, -2], [9, 9], [-2, 9]])
-    assert ["111111"] * 4 == picture(layout)
+    assert picture(layout) == ["111111"] * 4
 
 
 def test_runs_are_sorted_and_not_empty():
@@ -100,33 +100,33 @@ def test_owners_are_int16_while_ids_fit():
 
 
 def test_bleed_reaches_as_far_as_asked_and_is_round():
-    assert [".aaaa.", "aa11aa", "aa11aa", ".aaaa."] == picture(one(rectangle(2, 2), at=(2, 1)), 1.5)[:4]
-    assert ["..aa..", ".a11a.", ".a11a.", "..aa.."] == picture(one(rectangle(2, 2), at=(2, 1)), 0.5)
+    assert picture(one(rectangle(2, 2), at=(2, 1)), 1.5)[:4] == [".aaaa.", "aa11aa", "aa11aa", ".aaaa."]
+    assert picture(one(rectangle(2, 2), at=(2, 1)), 0.5) == ["..aa..", ".a11a.", ".a11a.", "..aa.."]
 
 
 def test_bleed_less_than_half_a_pixel_reaches_no_centre():
-    assert [".11...", ".11...", "......", "......"] == picture(one(rectangle(2, 2), at=(1, 0)), 0.49)
+    assert picture(one(rectangle(2, 2), at=(1, 0)), 0.49) == [".11...", ".11...", "......", "......"]
 
 
 def test_contested_bleed_goes_to_the_nearest_then_to_the_lowest_id():
     two = flat_display([rectangle(1, 1)] * 2)
-    assert ["1aa.bb2"] == picture(placed(two, [moved(0, 0), moved(6, 0)], (7, 1)), 2)
-    assert ["1aaabb2"] == picture(placed(two, [moved(0, 0), moved(6, 0)], (7, 1)), 3)
+    assert picture(placed(two, [moved(0, 0), moved(6, 0)], (7, 1)), 2) == ["1aa.bb2"]
+    assert picture(placed(two, [moved(0, 0), moved(6, 0)], (7, 1)), 3) == ["1aaabb2"]
 
 
 def test_equal_distance_goes_to_the_lowest_id_wherever_it_lies():
     two = flat_display([rectangle(1, 1)] * 2)
-    assert ["2bbaaa1"] == picture(placed(two, [moved(6, 0), moved(0, 0)], (7, 1)), 3)
+    assert picture(placed(two, [moved(6, 0), moved(0, 0)], (7, 1)), 3) == ["2bbaaa1"]
 
 
 def test_bleed_never_takes_a_pixel_from_inside():
     two = flat_display([rectangle(2, 2)] * 2)
-    assert ["1122", "1122"] == picture(placed(two, [moved(0, 0), moved(2, 0)], (4, 2)), 5)
+    assert picture(placed(two, [moved(0, 0), moved(2, 0)], (4, 2)), 5) == ["1122", "1122"]
 
 
 def test_bleed_stays_on_its_page():
     layout = placed(flat_display([rectangle(1, 1)]), [moved(2, 1)], (3, 2), pages=2)
-    assert [-1] * 5 + [1] + [0] * 6 == pixel_owners(layout, 9).tolist()
+    assert pixel_owners(layout, 9).tolist() == [-1] * 5 + [1] + [0] * 6
 
 
 def brute_force(layout: Layout, bleed: float) -> list[int]:
@@ -207,7 +207,7 @@ def test_random_cuts_of_a_page_leave_no_pixel_out(seed, slope, offset):
             triangles += [[a, b, c], [a, c, d]]
     layout = tiling(triangles, (15, 15))
     shear = np.array([[1, 0, 0], [0, 1, 0]], dtype=float)
-    assert 1.0 == fill(layout)
+    assert fill(layout) == 1.0
     shear[0, 1], shear[0, 2] = slope, offset
     sheared = replace(layout, quilt_from_facet=np.tile(shear, (50, 1, 1)))
     outline = replace(tiling([rectangle(15, 15)], (15, 15)), quilt_from_facet=shear[None])

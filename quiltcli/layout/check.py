@@ -72,7 +72,7 @@ def _bad_numbers(layout: Layout) -> Iterator[Problem]:
             )
         for key in _NUMBERS:
             if not np.isfinite(getattr(layout, key)[row]).all():
-                yield layout.problem(f"facet {facet} has numbers that are not finite", row, key)
+                yield layout.problem(f"facet {facet} has numbers in {key} that are not finite", row, key)
         corners = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
         if len(corners) < 3:
             message = f"facet {facet} has {len(corners)} corners; a polygon has at least 3"
@@ -86,12 +86,15 @@ def _singular(layout: Layout, row: int) -> Iterator[Problem]:
     linear = layout.quilt_from_facet[row, :, :2]
     area = abs(linear[0, 0] * linear[1, 1] - linear[0, 1] * linear[1, 0])
     if area <= 1e-12 * (linear * linear).sum():
-        message = f"facet {layout.facet[row]} is squeezed to a line; the map's determinant is {area:g}"
-        yield layout.problem(message, row, "quilt_from_facet")
+        facet, key = layout.facet[row], "quilt_from_facet"
+        message = f"facet {facet} is squeezed to a line; the determinant of {key} is {area:g}"
+        yield layout.problem(message, row, key)
     raster = np.stack((layout.du[row], layout.dv[row]))
     area = float(np.linalg.norm(np.cross(raster[0], raster[1])))
     if area <= 1e-12 * (raster * raster).sum():
-        yield layout.problem(f"facet {layout.facet[row]} has no area: du and dv are parallel", row, "du")
+        yield layout.problem(
+            f"facet {layout.facet[row]} has no area in the world: du and dv are parallel", row, "du"
+        )
 
 
 def _outside_raster(layout: Layout) -> Iterator[Problem]:

@@ -119,11 +119,11 @@ def _facet_lines(layout: Layout, row: int) -> list[str]:
 def _flow(values: np.ndarray) -> str:
     """Numbers as a YAML flow sequence, nested like the array."""
     if values.ndim == 0:
-        return _number(float(values))
+        return number_text(float(values))
     return "[" + ", ".join(_flow(value) for value in values) + "]"
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
     """The shortest text a YAML 1.1 or 1.2 reader takes for exactly this number."""
     if value.is_integer() and abs(value) < 2**53 and str(value) != "-0.0":
         return str(int(value))
