@@ -130,7 +130,7 @@ def _radiance(scene: Scene, eye: FloatArray, position: FloatArray, points: _Poin
         _add_light(result, points, nv, -direction, color)
     for place, color in zip(lights.point_position, lights.point_color, strict=True):
         offset = (place - eye).astype(np.float32)[:, None] - position.astype(np.float32)
-        nearness = np.float32(1) / np.maximum(_dot(offset, offset), _LEAST_DISTANCE2)
+        nearness = np.reciprocal(np.maximum(_dot(offset, offset), _LEAST_DISTANCE2))
         offset *= np.sqrt(nearness)
         _add_light(result, points, nv, offset, color, nearness)
     if lights.headlight:
