@@ -7,7 +7,6 @@ mapped pixel centre is taken (nearest sampling), in both directions.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -16,13 +15,16 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.channels import CHANNELS, exr_channels
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.layout import Layout
 
 Channel: TypeAlias = NDArray[Any]
 
-BACKGROUND: Mapping[str, float] = MappingProxyType({"Z": math.inf, "zv": math.inf})
-"""What pixels of no facet hold, by channel; 0 in channels that are not named."""
+BACKGROUND: Mapping[str, float] = MappingProxyType(
+    {layer: empty for layer, (_, empty) in exr_channels(CHANNELS).items()}
+)
+"""What pixels of no facet hold, by EXR channel; 0 in channels that are not named."""
 
 _WHOLE = 1e-3  # pixels a raster's corners may be off a whole-pixel map: centres stay in the same pixels
 
