@@ -18,6 +18,7 @@ Float32Array: TypeAlias = NDArray[np.float32]
 IntArray: TypeAlias = NDArray[np.int64]
 Int32Array: TypeAlias = NDArray[np.int32]
 BoolArray: TypeAlias = NDArray[np.bool_]
+OwnerArray: TypeAlias = NDArray[np.int16] | NDArray[np.int32]
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:

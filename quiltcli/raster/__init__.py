@@ -1,1 +1,94 @@
-"""Rasterization: which triangle does each pixel's ray meet first?"""
+"""Rasterization: which triangle does each pixel's ray meet first?
+
+The stages, in order: `blocks` cuts the facets' rectangles into pieces that fit the cache; `prewarp`
+gives each pair of binning to its blocks and makes `planes` of it; `small` and `large` raise the depth
+`keys` of a canvas; `visibility` reads from the keys what each pixel sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.geometry import OwnerArray
+from quiltcli.homography import QuiltRays
+from quiltcli.raster.blocks import Blocks, cut_batches, cut_blocks, new_canvas, ray_matrices
+from quiltcli.raster.depth import DepthRange, triangles_in_range
+from quiltcli.raster.hits import Hits
+from quiltcli.raster.keys import serial_bits
+from quiltcli.raster.large import draw_large
+from quiltcli.raster.prewarp import BlockPairs, Sight, block_matrices, make_planes, split_pairs
+from quiltcli.raster.small import LIMIT, draw_small
+from quiltcli.raster.visibility import read_canvas
+from quiltcli.viewer import Viewer
+
+__all__ = [
+    "Blocks",
+    "Frame",
+    "Hits",
+    "Sight",
+    "batches",
+    "cut_blocks",
+    "rasterize",
+    "split_pairs",
+    "triangles_in_range",
+]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Everything the batches of one frame share; nothing in it is written to.
+
+    Attributes:
+        viewer: the viewer.
+        sight: the scene from the viewer's eye.
+        rays: rays through the quilt.
+        blocks: the blocks of the layout.
+        pairs: triangles by block.
+        owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
+    """
+
+    viewer: Viewer
+    sight: Sight
+    rays: QuiltRays
+    blocks: Blocks
+    pairs: BlockPairs
+    owners: OwnerArray
+
+
+def batches(frame: Frame) -> list[tuple[int, int]]:
+    """The frame's work in ranges of blocks; any may be rasterized anywhere, in any order."""
+    return cut_batches(np.diff(frame.pairs.start), frame.blocks)
+
+
+def rasterize(
+    frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.0, 0.0)
+) -> Iterator[Hits]:
+    """What the pixels of one batch see.
+
+    Args:
+        frame: the frame.
+        batch: one of `batches(frame)`.
+        sample: where in the pixel to look, in pixels from its centre.
+
+    Yields:
+        Hits of distinct pixels, each pixel of the batch at most once.
+    """
+    counts = np.diff(frame.pairs.start)
+    block = batch[0] + np.flatnonzero(counts[batch[0] : batch[1]])
+    bits = serial_bits(int(counts[block].sum()))
+    canvas = new_canvas(block, frame.blocks)
+    rays = ray_matrices(frame.rays.eye_from_quilt, frame.blocks, block, sample)
+    viewer = frame.viewer
+    limits = DepthRange(viewer.near, viewer.far, viewer.depth == "radial", viewer.look, rays)
+    matrices = block_matrices(frame.rays, frame.blocks, block, sample)
+    chunks = make_planes(frame.sight, frame.pairs, frame.blocks, block, matrices)
+    for planes in chunks:
+        width = planes.box[1] - planes.box[0]
+        height = planes.box[3] - planes.box[2]
+        small = np.maximum(width, height) < LIMIT
+        draw_small(planes.take(np.flatnonzero(small)), canvas, limits, bits)
+        draw_large(planes.take(np.flatnonzero(~small)), canvas, limits, bits)
+    yield from read_canvas(canvas, chunks, frame.blocks, rays, frame.owners, bits)

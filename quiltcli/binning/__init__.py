@@ -1,0 +1,116 @@
+"""Binning: which triangles may show on which facets (Harish & Narayanan, §3.2.1).
+
+First pass: a ray from the eye through every vertex, against the cores of the lit facets. Three
+vertices on one core settle the triangle: it shows there and nowhere else. Second pass: the rest goes
+through a grid over directions and an exact test of cones. All facets whose lit side faces the eye
+take part, hidden behind others or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.binning.broad import candidate_pairs
+from quiltcli.binning.cones import Cones, Parts, facet_parts, lit_cones, overlapping
+from quiltcli.binning.cores import facet_cores
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
+
+__all__ = ["Pairs", "Parts", "bin_triangles", "facet_parts", "lit_cones"]
+
+_CHUNK = 1 << 17
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """N pairs of a triangle and a facet it may show on, by facet, then triangle.
+
+    Attributes:
+        facet: (N,) facet index.
+        triangle: (N,) triangle index.
+        settled: triangles that the first pass settled.
+        reaching: triangles that reach any facet.
+    """
+
+    facet: Int32Array
+    triangle: Int32Array
+    settled: int
+    reaching: int
+
+
+def bin_triangles(
+    vertices: FloatArray,
+    triangles: Int32Array,
+    wanted: BoolArray,
+    parts: Parts,
+    lit: BoolArray,
+    eye: FloatArray,
+) -> Pairs:
+    """Sort the triangles to the facets on which this eye may see them.
+
+    Args:
+        vertices: (V, 3) world minus eye, metres.
+        triangles: (T, 3).
+        wanted: (T,) triangles that can be drawn at all.
+        parts: convex pieces of the facets, in the world.
+        lit: (F,) facets that are drawn.
+        eye: (3,) world metres.
+    """
+    cones = lit_cones(parts, lit, eye)
+    drawn = np.flatnonzero(wanted)
+    corners = triangles[drawn]
+    part = core_of_vertices(vertices, cones)[corners]
+    same = (part[:, 0] == part[:, 1]) & (part[:, 1] == part[:, 2]) & (part[:, 0] >= 0)
+    keys = [_key(cones.facet[part[same, 0]], drawn[same])]
+    keys.extend(_second_pass(vertices, triangles, drawn[~same], cones))
+    found = np.concatenate(keys)
+    found.sort()
+    found = found[np.diff(found, prepend=-1) != 0]
+    reaching = np.zeros(len(triangles), dtype=np.bool_)
+    reaching[found & 0xFFFFFFFF] = True
+    return Pairs(
+        facet=(found >> 32).astype(np.int32),
+        triangle=(found & 0xFFFFFFFF).astype(np.int32),
+        settled=int(same.sum()),
+        reaching=int(reaching.sum()),
+    )
+
+
+def core_of_vertices(vertices: FloatArray, cones: Cones) -> Int32Array:
+    """The part (V,) whose core the ray from the eye through each vertex meets, −1 for none."""
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    corners, counts = facet_cores(cones)
+    fans = np.maximum(counts - 2, 0)
+    part = np.repeat(np.arange(fans.size), fans)
+    if not part.size:
+        return np.full(len(vertices), -1, dtype=np.int32)
+    rank = np.arange(part.size) - np.repeat(np.cumsum(fans) - fans, fans)
+    first = part * corners.shape[1]
+    faces = np.stack((first, first + rank + 1, first + rank + 2), axis=1).astype(np.int32)
+    scene = EmbreeScene()
+    TriangleMesh(scene, corners.reshape(-1, 3).astype(np.float32), faces)
+    origin = np.zeros((1, 3), dtype=np.float32)
+    met = scene.run(np.broadcast_to(origin, vertices.shape), vertices.astype(np.float32))
+    result: Int32Array = np.append(part, -1).astype(np.int32)[met]
+    return result
+
+
+def _second_pass(vertices: FloatArray, triangles: Int32Array, rest: IntArray, cones: Cones) -> list[IntArray]:
+    """Keys of the pairs of the triangles that the first pass left, by the exact cone test."""
+    keys = []
+    for at in range(0, rest.size, _CHUNK):
+        chunk = rest[at : at + _CHUNK]
+        corners = vertices[triangles[chunk]]
+        first, second = candidate_pairs(corners, cones.wide)
+        meets = overlapping(corners, cones.planes, cones.wide, first, second)
+        keys.append(_key(cones.facet[second[meets]], chunk[first[meets]]))
+    return keys
+
+
+def _key(facet: Int32Array, triangle: IntArray) -> IntArray:
+    """Facet and triangle in one number that sorts by facet, then triangle."""
+    result: IntArray = facet.astype(np.int64) << 32 | triangle
+    return result

@@ -1,0 +1,186 @@
+"""Facets as convex cones of directions from the eye.
+
+What a facet can show lies in the cone of directions through its polygon. Working with cones, not with
+one projection plane, facets on all sides of the viewer and triangles beside or behind the eye need
+no special case. Every cone is made a little wider than its facet: by the bleed, and by one pixel that
+covers the rounding of the tests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.display import Facets, convex_parts
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot
+from quiltcli.layout import Layout
+
+_LONGEST_MITRE = 4.0
+
+
+@dataclass(frozen=True)
+class Parts:
+    """K convex pieces of the facets in the world; the corners of short pieces repeat the last one.
+
+    Attributes:
+        facet: (K,) facet index.
+        corners: (K, n, 3) the piece itself, world metres.
+        wide: (K, m, 3) the piece grown by the bleed and a pixel, world metres.
+    """
+
+    facet: Int32Array
+    corners: FloatArray
+    wide: FloatArray
+
+
+@dataclass(frozen=True)
+class Cones:
+    """K convex cones of directions from one eye, those of the lit parts.
+
+    Attributes:
+        facet: (K,) facet index.
+        corners: (K, n, 3) corners of the part minus the eye.
+        wide: (K, m, 3) corners of the grown part minus the eye.
+        planes: (K, m, 3) planes through the eye and the grown part's edges, positive inside;
+            unit length, or zero for a repeated corner.
+    """
+
+    facet: Int32Array
+    corners: FloatArray
+    wide: FloatArray
+    planes: FloatArray
+
+
+def facet_parts(facets: Facets, layout: Layout, bleed: int) -> Parts:
+    """The convex pieces of all facets that have a place in the quilt.
+
+    Args:
+        facets: the display.
+        layout: its places; the pixel a piece grows by is a quilt pixel.
+        bleed: pixels drawn past a facet's edge.
+    """
+    facet, start, corners = convex_parts(facets)
+    placed = np.flatnonzero(layout.page[facet] >= 0)
+    facet = facet[placed]
+    polygons = [facets.corners[corners[start[k] : start[k + 1]]] for k in placed.tolist()]
+    wide = [
+        _grow(
+            polygon,
+            facets.du[f],
+            facets.dv[f],
+            facets.origin[f],
+            layout.quilt_from_facet[f, :, :2],
+            bleed + 1.0,
+        )
+        for polygon, f in zip(polygons, facet.tolist(), strict=True)
+    ]
+    return Parts(facet.astype(np.int32), _padded(polygons), _padded(wide))
+
+
+def lit_cones(parts: Parts, lit: BoolArray, eye: FloatArray) -> Cones:
+    """The cones of the parts of lit facets; `lit` (F,), `eye` (3,)."""
+    k = np.flatnonzero(lit[parts.facet])
+    corners, wide = parts.corners[k] - eye, parts.wide[k] - eye
+    return Cones(parts.facet[k], corners, wide, cone_planes(wide))
+
+
+def cone_planes(corners: FloatArray) -> FloatArray:
+    """Inward unit planes (K, m, 3) through the origin and the edges of convex polygons (K, m, 3)."""
+    unit = corners / np.sqrt(dot(corners, corners))[..., None]
+    planes = cross(unit, np.roll(unit, -1, axis=1))
+    length = np.sqrt(dot(planes, planes))[..., None]
+    planes = np.divide(planes, length, out=np.zeros_like(planes), where=length > 1e-14)
+    side = dot(planes, unit.mean(axis=1)[:, None, :]).sum(axis=1)
+    result: FloatArray = planes * np.sign(side)[:, None, None]
+    return result
+
+
+def _grow(
+    polygon: FloatArray, du: FloatArray, dv: FloatArray, origin: FloatArray, linear: FloatArray, margin: float
+) -> FloatArray:
+    """A convex polygon (m, 3) that contains `polygon` (n, 3) and all within `margin` quilt pixels.
+
+    The edges are moved outward; where that would make a long spike, the polygon is widened by a
+    square of twice the margin instead. Both hold at least what is asked for.
+    """
+    basis = np.stack((du, dv), axis=1) @ np.linalg.inv(linear)
+    pixels = (polygon - origin) @ np.linalg.pinv(basis).T
+    ahead = np.roll(pixels, -1, axis=0) - pixels
+    area = (pixels[:, 0] * np.roll(pixels[:, 1], -1) - pixels[:, 1] * np.roll(pixels[:, 0], -1)).sum()
+    ahead /= np.sqrt((ahead * ahead).sum(axis=1))[:, None]
+    outward = np.stack((ahead[:, 1], -ahead[:, 0]), axis=1) * np.sign(area)
+    before = np.roll(outward, 1, axis=0)
+    cosine = (outward * before).sum(axis=1)
+    if (cosine > 2.0 / _LONGEST_MITRE**2 - 1.0).all():
+        grown = pixels + margin * (outward + before) / (1.0 + cosine)[:, None]
+    else:
+        square = margin * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        grown = _hull((pixels[:, None, :] + square).reshape(-1, 2))
+    result: FloatArray = grown @ basis.T + origin
+    return result
+
+
+def _hull(points: FloatArray) -> FloatArray:
+    """Convex hull of points (n, 2), anticlockwise (Andrew's monotone chain)."""
+    ordered = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
+
+    def chain(sequence: list[list[float]]) -> list[list[float]]:
+        hull: list[list[float]] = []
+        for x, y in sequence:
+            while len(hull) > 1:
+                (ax, ay), (bx, by) = hull[-2:]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
+                    break
+                hull.pop()
+            hull.append([x, y])
+        return hull[:-1]
+
+    return np.array(chain(ordered) + chain(ordered[::-1]))
+
+
+def _padded(polygons: list[FloatArray]) -> FloatArray:
+    """Polygons of different lengths as one array (K, m, 3) by repeating last corners."""
+    counts = np.array([len(p) for p in polygons], dtype=np.int64)
+    result = np.empty((counts.size, int(counts.max(initial=1)), 3))
+    if polygons:
+        start = np.concatenate(([0], np.cumsum(counts)))
+        rank = np.minimum(np.arange(result.shape[1]), counts[:, None] - 1)
+        result[:] = np.concatenate(polygons)[start[:-1, None] + rank]
+    return result
+
+
+def overlapping(
+    triangle: FloatArray, planes: FloatArray, wide: FloatArray, first: IntArray, second: IntArray
+) -> BoolArray:
+    """Which pairs of convex cones have directions in common; exact but for touching, which counts.
+
+    Two convex cones are apart exactly when a plane through the eye and an edge of one of them
+    separates them.
+
+    Args:
+        triangle: (T, n, 3) polygons minus the eye.
+        planes: (K, m, 3) inward planes of cones.
+        wide: (K, m, 3) corners of those cones.
+        first: (N,) indices into `triangle`.
+        second: (N,) indices into `planes`.
+    """
+    meets = np.ones(first.size, dtype=np.bool_)
+    alive = np.arange(first.size)
+    for edge in range(planes.shape[1]):
+        alive = _not_outside(planes[:, edge], triangle, second, first, alive)
+    own = cone_planes(triangle) if triangle.size else triangle
+    for edge in range(triangle.shape[1]):
+        alive = _not_outside(own[:, edge], wide, first, second, alive)
+    meets[:] = False
+    meets[alive] = True
+    return meets
+
+
+def _not_outside(
+    plane: FloatArray, corners: FloatArray, of_plane: IntArray, of_corners: IntArray, alive: IntArray
+) -> IntArray:
+    """Those `alive` pairs of which some corner is not on the outer side of the plane."""
+    n = plane[of_plane[alive]]
+    points = corners[of_corners[alive]]
+    return alive[(dot(points, n[:, None, :]) >= 0).any(axis=1)]

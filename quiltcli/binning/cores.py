@@ -1,0 +1,97 @@
+"""Cores: the directions that one facet alone can show.
+
+The first pass may settle a triangle when its three vertices fall on the same facet only if no other
+lit facet reaches into the triangle: not a neighbour's bleed, and on concave, folded or
+self-intersecting displays not another facet in front or behind. So every facet is cut back, plane by
+plane, until none of the others' cones meets it. What remains is convex: a triangle with its corners
+in it lies in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from quiltcli.binning.broad import candidate_pairs
+from quiltcli.binning.cones import Cones, overlapping
+from quiltcli.geometry import FloatArray, IntArray, dot, segments
+
+_MARGIN = 1e-5
+"""Radians kept free beside another facet's cone; Embree's rays are single precision."""
+
+
+def facet_cores(cones: Cones) -> tuple[FloatArray, IntArray]:
+    """Cut every part back to what no other facet's cone meets.
+
+    Args:
+        cones: the lit parts.
+
+    Returns:
+        corners (K, n, 3) of the cores minus the eye, short ones repeating their last corner, and
+        their numbers (K,), 0 where nothing remains.
+    """
+    corners = cones.corners
+    counts = np.full(cones.facet.size, corners.shape[1])
+    part, other = _conflicts(cones)
+    start = np.searchsorted(part, np.arange(cones.facet.size + 1))
+    _, rank = segments(start)
+    for turn in range(int(rank.max(initial=-1)) + 1):
+        now = np.flatnonzero(rank == turn)
+        plane = _dividing_planes(cones, part[now], other[now])
+        clipped, left = _clip(corners[part[now]], counts[part[now]], plane)
+        wider = clipped.shape[1] - corners.shape[1]
+        if wider > 0:
+            corners = np.concatenate((corners, np.repeat(corners[:, -1:], wider, axis=1)), axis=1)
+        corners = corners.copy()
+        corners[part[now], : clipped.shape[1]] = clipped
+        corners[part[now], clipped.shape[1] :] = clipped[:, -1:]
+        counts[part[now]] = left
+    return corners, counts
+
+
+def _conflicts(cones: Cones) -> tuple[IntArray, IntArray]:
+    """Parts and the parts of other facets whose grown cones meet them, ordered by part."""
+    first, second = candidate_pairs(cones.corners, cones.wide)
+    other = cones.facet[first] != cones.facet[second]
+    first, second = first[other], second[other]
+    meets = overlapping(cones.corners, cones.planes, cones.wide, first, second)
+    first, second = first[meets], second[meets]
+    order = np.lexsort((second, first))
+    return first[order], second[order]
+
+
+def _dividing_planes(cones: Cones, part: IntArray, other: IntArray) -> FloatArray:
+    """Planes (N, 3), positive on the side kept: the edge of `other` that leaves most of `part`."""
+    centre = cones.corners[part].mean(axis=1)
+    centre /= np.sqrt(dot(centre, centre))[:, None]
+    planes = cones.planes[other]
+    outside = -dot(planes, centre[:, None, :])
+    outside[~planes.any(axis=2)] = -np.inf
+    best = outside.argmax(axis=1)
+    result: FloatArray = -planes[np.arange(part.size), best]
+    return result
+
+
+def _clip(polygons: FloatArray, counts: IntArray, planes: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Clip convex polygons (N, n, 3) with `counts` corners by one plane each (Sutherland & Hodgman).
+
+    Returns:
+        polygons (N, m, 3), short ones repeating their last corner, and their corner counts (N,);
+        fewer than three corners are none.
+    """
+    length = np.sqrt(dot(polygons, polygons))
+    side = dot(polygons, planes[:, None, :]) - _MARGIN * length
+    ahead_of = np.roll(np.arange(polygons.shape[1]), -1)
+    valid = np.arange(polygons.shape[1]) < counts[:, None]
+    ahead = np.where(np.arange(polygons.shape[1]) == counts[:, None] - 1, 0, ahead_of)
+    next_side = np.take_along_axis(side, ahead, axis=1)
+    crosses = valid & ((side > 0) != (next_side > 0))
+    share = np.divide(side, side - next_side, out=np.zeros_like(side), where=crosses)[..., None]
+    cut = polygons + share * (np.take_along_axis(polygons, ahead[..., None], axis=1) - polygons)
+    points = np.stack((polygons, cut), axis=2).reshape(len(polygons), -1, 3)
+    kept = np.stack((valid & (side > 0), crosses), axis=2).reshape(len(polygons), -1)
+    left = kept.sum(axis=1)
+    order = np.argsort(~kept, axis=1, kind="stable")
+    width = max(int(left.max(initial=1)), 1)
+    rank = np.minimum(np.arange(width), np.maximum(left - 1, 0)[:, None])
+    result = np.take_along_axis(points, np.take_along_axis(order, rank, axis=1)[..., None], axis=1)
+    return result, np.where(left >= 3, left, 0)

@@ -1,0 +1,143 @@
+"""Blocks: the pieces of the quilt that are rasterized at a time.
+
+A block is a part of one facet's rectangle on its page, at most `SIDE` pixels wide and high, so that
+pixel coordinates inside it stay small (edge functions are exact there) and its depth keys fit the
+cache. Keys are kept in microtiles: 8 × 8 pixels that are 64 neighbours in memory.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
+from quiltcli.layout import Layout, quilt_polygons
+
+SIDE = 512
+BATCH_PIXELS = 1 << 20
+BATCH_PAIRS = 1 << 17
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """B blocks that cover the facets' rectangles, in facet order.
+
+    Attributes:
+        start: (F+1,) offsets of every facet's blocks.
+        facet: (B,) facet index.
+        x0: (B,) page column of the block's first pixel.
+        y0: (B,) page row of the block's first pixel.
+        width: (B,) columns.
+        height: (B,) rows.
+        address: (B,) flat quilt address of the block's first pixel.
+        stride: (B,) pixels from one row to the next, the page's width.
+        columns: (F,) blocks from left to right in a facet's rectangle.
+    """
+
+    start: IntArray
+    facet: Int32Array
+    x0: IntArray
+    y0: IntArray
+    width: IntArray
+    height: IntArray
+    address: IntArray
+    stride: IntArray
+    columns: IntArray
+
+
+def facet_rectangles(layout: Layout, bleed: int) -> IntArray:
+    """Pixel rectangles (F, 4) x0, y0, x1, y1 (exclusive) of the facets with their bleed, cut to the page."""
+    corners = quilt_polygons(layout)
+    low = np.minimum.reduceat(corners, layout.corner_start[:-1], axis=0)
+    high = np.maximum.reduceat(corners, layout.corner_start[:-1], axis=0)
+    page_size = layout.pages[np.maximum(layout.page, 0)]
+    low = np.clip(np.floor(low) - bleed, 0, page_size)
+    high = np.clip(np.ceil(high) + bleed, 0, page_size)
+    high[layout.page < 0] = low[layout.page < 0]
+    return np.concatenate((low, high), axis=1).astype(np.int64)
+
+
+def cut_blocks(layout: Layout, bleed: int) -> Blocks:
+    """Cut every facet's rectangle, bleed included, into blocks, row by row."""
+    rectangle = facet_rectangles(layout, bleed)
+    extent = rectangle[:, 2:] - rectangle[:, :2]
+    counts = -(-extent // SIDE)
+    start = np.concatenate(([0], np.cumsum(counts[:, 0] * counts[:, 1])))
+    facet, rank = segments(start)
+    columns = np.maximum(counts[:, 0], 1)
+    x0 = rectangle[facet, 0] + rank % columns[facet] * SIDE
+    y0 = rectangle[facet, 1] + rank // columns[facet] * SIDE
+    page = layout.page[facet]
+    stride = layout.pages[page, 0].astype(np.int64)
+    return Blocks(
+        start=start,
+        facet=facet.astype(np.int32),
+        x0=x0,
+        y0=y0,
+        width=np.minimum(rectangle[facet, 2] - x0, SIDE),
+        height=np.minimum(rectangle[facet, 3] - y0, SIDE),
+        address=layout.page_offset[page] + y0 * stride + x0,
+        stride=stride,
+        columns=columns,
+    )
+
+
+def cut_batches(pair_counts: IntArray, blocks: Blocks) -> list[tuple[int, int]]:
+    """Group consecutive blocks into batches of bounded work.
+
+    Args:
+        pair_counts: (B,) block pairs of each block; blocks without any cost nothing.
+        blocks: the blocks.
+
+    Returns:
+        Ranges [first, last) of blocks; what they hold does not depend on the number of workers.
+    """
+    area = np.where(pair_counts > 0, blocks.width * blocks.height, 0)
+    batches = []
+    first = pixels = pairs = 0
+    for block in np.flatnonzero(pair_counts).tolist():
+        if pairs and (pixels + area[block] > BATCH_PIXELS or pairs + pair_counts[block] > BATCH_PAIRS):
+            batches.append((first, block))
+            first, pixels, pairs = block, 0, 0
+        pixels += int(area[block])
+        pairs += int(pair_counts[block])
+    if pairs:
+        batches.append((first, pair_counts.size))
+    return batches
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """Depth keys of one batch, microtile by microtile, and where each microtile lies.
+
+    Attributes:
+        block: (K,) the batch's blocks, indices into `Blocks`.
+        tile_start: (K+1,) offsets of every block's microtiles.
+        tiles_across: (K,) microtiles from left to right in a block.
+        keys: (M·64,) int64, 0 where nothing has been drawn.
+    """
+
+    block: IntArray
+    tile_start: IntArray
+    tiles_across: IntArray
+    keys: IntArray
+
+
+def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
+    """An empty canvas for the blocks with these indices."""
+    across = -(-blocks.width[block] // 8)
+    down = -(-blocks.height[block] // 8)
+    tile_start = np.concatenate(([0], np.cumsum(across * down)))
+    return Canvas(block, tile_start, across, np.zeros(int(tile_start[-1]) * 64, dtype=np.int64))
+
+
+def ray_matrices(
+    eye_from_quilt: FloatArray, blocks: Blocks, block: IntArray, sample: tuple[float, float]
+) -> FloatArray:
+    """Matrices (K, 3, 3) from block pixels, whole numbers at the `sample` of each pixel, to eye rays."""
+    matrix = eye_from_quilt[blocks.facet[block]].copy()
+    x = (blocks.x0[block] + 0.5 + sample[0])[:, None]
+    y = (blocks.y0[block] + 0.5 + sample[1])[:, None]
+    matrix[:, :, 2] += x * matrix[:, :, 0] + y * matrix[:, :, 1]
+    return matrix

@@ -1,0 +1,40 @@
+"""Depth keys: nearest first, then lowest triangle, in one comparison of whole numbers.
+
+A key is the bit pattern of 1/t, whose doubles order like integers when positive, with its low bits
+replaced by the pair's serial number counted from the top: the greater key is the nearer surface, and
+of two at equal depth the pair with the lower serial, whatever the order in which they are drawn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from quiltcli.geometry import FloatArray, Int32Array, IntArray
+
+LEAST_BITS = 22
+
+
+def serial_bits(pairs: int) -> int:
+    """Bits that hold the serials of `pairs` block pairs; at least 30 bits of depth remain."""
+    return max(LEAST_BITS, pairs.bit_length())
+
+
+def serial_part(serial: Int32Array, bits: int) -> IntArray:
+    """The low bits of the keys of these serials."""
+    result: IntArray = ((1 << bits) - 1) - serial.astype(np.int64)
+    return result
+
+
+def make_keys(inverse: FloatArray, serial: IntArray, bits: int) -> IntArray:
+    """Keys from 1/t, in the memory of `inverse`; a negative 1/t gives a key below every other."""
+    keys = inverse.view(np.int64)
+    keys &= ~np.int64((1 << bits) - 1)
+    keys |= serial
+    return keys
+
+
+def serial_of(keys: IntArray, bits: int) -> IntArray:
+    """Serials of keys that are not 0."""
+    mask = np.int64((1 << bits) - 1)
+    result: IntArray = mask - (keys & mask)
+    return result

@@ -1,0 +1,175 @@
+"""Prewarp: the pairs of binning become block pairs, and those become planes.
+
+The vertices of a facet's triangles are carried through the facet's own matrix into homogeneous
+pixels, which is the paper's prewarping (§3.2.2): from here on the whole quilt is one raster.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.binning import Pairs
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
+from quiltcli.homography import QuiltRays
+from quiltcli.raster.blocks import SIDE, Blocks
+from quiltcli.raster.planes import (
+    LATTICE,
+    Planes,
+    depth_bounds,
+    edge_planes,
+    gather_corners,
+    pixel_boxes,
+    project,
+)
+
+_CHUNK = 1 << 14
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The scene as one eye sees it.
+
+    Attributes:
+        vertices: (V, 3) world minus eye, metres.
+        triangles: (T, 3).
+        cut: (T,) triangles that reach beyond the near or far depth.
+    """
+
+    vertices: FloatArray
+    triangles: Int32Array
+    cut: BoolArray
+
+
+@dataclass(frozen=True)
+class BlockPairs:
+    """N (triangle, block) pairs by block, then triangle.
+
+    Attributes:
+        start: (B+1,) offsets of every block's pairs.
+        triangle: (N,) triangle index.
+    """
+
+    start: IntArray
+    triangle: Int32Array
+
+
+def block_matrices(
+    rays: QuiltRays, blocks: Blocks, block: IntArray, sample: tuple[float, float]
+) -> FloatArray:
+    """Matrices (K, 3, 3) from points minus eye to homogeneous pixels of blocks.
+
+    Whole numbers are sample positions: `sample` is the place in the pixel, (0, 0) its centre.
+    """
+    matrix = rays.quilt_from_eye[blocks.facet[block]].copy()
+    x = blocks.x0[block] + (0.5 + sample[0] + LATTICE[0])
+    y = blocks.y0[block] + (0.5 + sample[1] + LATTICE[1])
+    matrix[:, 0] -= x[:, None] * matrix[:, 2]
+    matrix[:, 1] -= y[:, None] * matrix[:, 2]
+    return matrix
+
+
+def split_pairs(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> BlockPairs:
+    """Give every pair to the blocks of its facet that the triangle's bounding box touches."""
+    per_facet = np.diff(blocks.start)
+    single = per_facet[pairs.facet] == 1
+    block = [blocks.start[pairs.facet[single]]]
+    triangle = [pairs.triangle[single]]
+    rest = np.flatnonzero(~single)
+    for at in range(0, rest.size, _CHUNK):
+        chunk = rest[at : at + _CHUNK]
+        found, owner = _blocks_under(pairs.facet[chunk], pairs.triangle[chunk], sight, rays, blocks)
+        block.append(found)
+        triangle.append(pairs.triangle[chunk][owner])
+    keys = np.concatenate(block) << 32 | np.concatenate(triangle)
+    if rest.size:
+        keys.sort()
+    start = np.searchsorted(keys, np.arange(blocks.facet.size + 1, dtype=np.int64) << 32)
+    return BlockPairs(start, (keys & 0xFFFFFFFF).astype(np.int32))
+
+
+def _blocks_under(
+    facet: Int32Array, triangle: Int32Array, sight: Sight, rays: QuiltRays, blocks: Blocks
+) -> tuple[IntArray, IntArray]:
+    """Blocks (S,) that the triangles' boxes touch, and whose box each is (S,)."""
+    first, last = blocks.start[facet], blocks.start[facet + 1] - 1
+    matrix = block_matrices(rays, blocks, first, (0.0, 0.0))
+    width = blocks.x0[last] + blocks.width[last] - blocks.x0[first]
+    height = blocks.y0[last] + blocks.height[last] - blocks.y0[first]
+    corners = gather_corners(sight.vertices, sight.triangles[triangle])
+    box = pixel_boxes(project(corners, np.ascontiguousarray(matrix.transpose(1, 2, 0))), width, height)
+    box[0::2] -= 1  # samples may lie half a pixel beside the centre
+    box[1::2] += 1
+    limit = np.stack((width - 1, height - 1))
+    x0, y0 = np.maximum(box[0::2], 0) // SIDE
+    x1, y1 = np.minimum(box[1::2], limit) // SIDE
+    counts = np.maximum(x1 - x0 + 1, 0) * np.maximum(y1 - y0 + 1, 0)
+    counts[(box[1] < box[0] + 2) | (box[3] < box[2] + 2)] = 0
+    owner, rank = segments(np.concatenate(([0], np.cumsum(counts))))
+    across = (x1 - x0 + 1)[owner]
+    column = x0[owner] + rank % across
+    row = y0[owner] + rank // across
+    return first[owner] + row * blocks.columns[facet[owner]] + column, owner
+
+
+def make_planes(
+    sight: Sight,
+    block_pairs: BlockPairs,
+    blocks: Blocks,
+    block: IntArray,
+    matrices: FloatArray,
+) -> list[Planes]:
+    """Planes of all pairs of some blocks that can have fragments, in chunks that fit the cache.
+
+    Args:
+        sight: the scene from the eye.
+        block_pairs: pairs of all blocks.
+        blocks: the blocks.
+        block: (K,) the blocks of the batch, ascending.
+        matrices: (K, 3, 3) from `block_matrices`.
+    """
+    counts = block_pairs.start[block + 1] - block_pairs.start[block]
+    place, rank = segments(np.concatenate(([0], np.cumsum(counts))))
+    source = block_pairs.start[block][place] + rank
+    chunks = []
+    for at in range(0, source.size, _CHUNK):
+        part = slice(at, at + _CHUNK)
+        chunk = _plane_chunk(
+            sight, block_pairs.triangle[source[part]], place[part], at, blocks, block, matrices
+        )
+        if chunk.triangle.size:
+            chunks.append(chunk)
+    return chunks
+
+
+def _plane_chunk(
+    sight: Sight,
+    triangle: Int32Array,
+    place: IntArray,
+    first_serial: int,
+    blocks: Blocks,
+    block: IntArray,
+    matrices: FloatArray,
+) -> Planes:
+    """Planes of the pairs of one chunk, without those that cover no pixel."""
+    corners = gather_corners(sight.vertices, sight.triangles[triangle])
+    homogeneous = project(corners, np.ascontiguousarray(matrices[place].transpose(1, 2, 0)))
+    box = pixel_boxes(homogeneous, blocks.width[block][place], blocks.height[block][place])
+    alive = np.flatnonzero((box[0] <= box[1]) & (box[2] <= box[3]))
+    homogeneous = np.take(homogeneous, alive, axis=2)
+    edge, inverse, determinant = edge_planes(homogeneous)
+    low, high = depth_bounds(homogeneous[:, 2])
+    planes = Planes(
+        triangle=triangle[alive],
+        block=place[alive].astype(np.int32),
+        serial=(alive + first_serial).astype(np.int32),
+        edge=edge,
+        inverse=inverse,
+        low=low,
+        high=high,
+        box=np.take(box, alive, axis=1),
+        cut=sight.cut[triangle[alive]],
+    )
+    solid = np.flatnonzero(determinant)
+    return planes if solid.size == alive.size else planes.take(solid)
