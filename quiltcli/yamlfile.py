@@ -58,12 +58,15 @@ class Source:
         `on_key` the place is the key itself, not its value.
         """
         full = self.prefix + ((key,) if isinstance(key, str) else tuple(key))
+        typed = [text for key_set, text in self.origins.items() if key_set[: len(full)] == full]
+        if typed and full not in self.marks:
+            return Problem(message, file=typed[0], key=self.dotted(full))
         for size in range(len(full), -1, -1):
             if full[:size] in self.origins:
                 return Problem(message, file=self.origins[full[:size]], key=self.dotted(full))
             if full[:size] in self.marks:
                 mark = self.marks[full[:size]]
-                line, column = mark.key if on_key or size < len(full) else mark.value
+                line, column = mark.key if on_key and size == len(full) else mark.value
                 return Problem(message, str(self.path or ""), line, column, self.dotted(full))
         return Problem(message, str(self.path or ""), key=self.dotted(full))
 

@@ -80,7 +80,7 @@ def compose(text: str, path: Path) -> yaml.Node | None:
     """Node tree of a single document, by libyaml where there is one."""
     try:
         return _fast_compose(text)
-    except yaml.YAMLError:
+    except (yaml.YAMLError, RecursionError):
         pass
     try:
         return _Loader(text).get_single_node()
@@ -120,22 +120,47 @@ def _syntax_problem(error: yaml.YAMLError, text: str, file: str) -> Problem:
     problem, context = getattr(error, "problem", None), getattr(error, "context", None)
     if mark is None:
         return Problem(f"not YAML: {error}", file)
+    if str(problem) in _AT_START:
+        mark = getattr(error, "context_mark", None) or mark
     line, column = place(mark)
     if text[mark.index : mark.index + 1] == "\t":
         return Problem("a tab cannot indent in YAML (use spaces)", file, line, column)
-    words = _HINTS.get(str(problem)) or f"not YAML: {problem}"
     start = getattr(error, "context_mark", None)
-    if context and start is not None and str(problem) not in _HINTS:
+    return Problem(_words(str(problem), context, start), file, line, column)
+
+
+def _words(problem: str, context: str | None, start: Any) -> str:
+    """PyYAML's problem, in the words of people who write YAML and do not parse it."""
+    if problem in _HINTS:
+        return _HINTS[problem]
+    if problem.startswith("expected <block end>"):
+        return "this does not fit what stands before it (check the indentation and the quotes)"
+    first = re.match(r"found character (.+) that cannot start any token", problem)
+    if first is not None:
+        return f"a value cannot start with {first[1]} (put it in quotes)"
+    words = f"not YAML: {problem}"
+    if context and start is not None:
         words += f" ({context} that starts in line {start.line + 1})"
-    return Problem(words, file, line, column)
+    for theirs, ours in _WORDS:
+        words = words.replace(theirs, ours)
+    return words
 
 
 _HINTS = {
     "mapping values are not allowed here": "a second ': ' in one line (quote the text, or indent it well)",
     "could not find expected ':'": "expected 'key: value', found no ':'",
     "but found another document": "a second document starts here (one file holds one)",
-    "found unexpected end of stream": "the file ends inside a quoted text",
+    "found unexpected end of stream": "this quoted text never ends",
 }
+# PyYAML notices these at the end of what is wrong; the start is where to mend it.
+_AT_START = ("could not find expected ':'", "found unexpected end of stream")
+_WORDS = (
+    ("'<stream end>'", "the end of the file"),
+    ("a flow sequence", "a list in [ ]"),
+    ("a flow mapping", "a mapping in { }"),
+    ("a flow node", "a value"),
+    ("undefined alias", "no anchor for the alias"),
+)
 
 
 def place(mark: Any) -> tuple[int, int]:

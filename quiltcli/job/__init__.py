@@ -7,7 +7,7 @@ Load a file and every problem in it comes in one `JobError`; every model and par
 from quiltcli.job.display import UNITS, DisplayFile, FacetSpec, ResolutionSpec, TransformSpec
 from quiltcli.job.dump import dump_job, dump_yaml
 from quiltcli.job.hashing import file_sha256, job_sha256
-from quiltcli.job.layout import LayoutFile, PackSpec, PageSpec, PlaceSpec, UvLayoutSpec
+from quiltcli.job.layout import PACKING_METHODS, LayoutFile, PackSpec, PageSpec, PlaceSpec, UvLayoutSpec
 from quiltcli.job.loading import (
     check_file,
     file_kind,
@@ -31,6 +31,7 @@ from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, View
 __all__ = [
     "CHANNELS",
     "COMPRESSIONS",
+    "PACKING_METHODS",
     "UNITS",
     "AmbientLight",
     "CsvSpec",

@@ -59,18 +59,19 @@ def describe(value: Any) -> str:
 def suggest(word: object, known: Iterable[str]) -> str:
     """The known word nearest to `word`, or an empty text when none is near."""
     by_lower = {name.lower(): name for name in known}
-    near = get_close_matches(str(word).lower(), by_lower, n=1, cutoff=0.6)
+    near = get_close_matches(str(word).lower(), by_lower, n=1, cutoff=0.7)
     return by_lower[near[0]] if near else ""
 
 
 def one_of(names: Iterable[str], value: Any, also: str = "") -> str:
     """`value` itself if it is one of `names`; `also` names what else would have been good."""
     names = list(names)
+    expected = either([*names, also] if also else names)
     if isinstance(value, str) and value in names:
         return str(value)
     near = suggest(value, names) if isinstance(value, str) else ""
     hint = f" (did you mean {near!r}?)" if near else ""
-    raise complaint(f"expected {either(names)}{also}, got {describe(value)}{hint}")
+    raise complaint(f"expected {expected}, got {describe(value)}{hint}")
 
 
 def either(names: Sequence[str]) -> str:

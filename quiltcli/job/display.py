@@ -34,7 +34,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 def _units(value: Any) -> Any:
     if isinstance(value, str):
-        return one_of(UNITS, value, " or a number of metres")
+        return one_of(UNITS, value, "a number of metres")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise complaint(f"expected m, cm, mm, in, ft or a number of metres, got {describe(value)}")
     if not 0 < value < float("inf"):

@@ -18,18 +18,23 @@ from quiltcli.job.base import (
     Model,
     Natural,
     Number,
+    OneOf,
     Size,
     Vec3,
 )
 
 
+# Names of the packing stage, which comes later; known here so that a wrong one is shown in its line.
+PACKING_METHODS = ("maxrects", "rows")
+
+
 class PackSpec(Model):
     """How to pack the facets of a display onto quilt pages."""
 
-    method: str = "rows"
+    method: Annotated[str, OneOf(PACKING_METHODS)] = "maxrects"
     """Packing method."""
-    size: Size = (8192, 8192)
-    """Width and height of a page, pixels."""
+    size: Size | None = None
+    """Width and height of a page, pixels; one page that holds everything when absent."""
     max_pages: Count | None = None
     """Most pages that may be used; any number when absent."""
     padding: Natural = 2

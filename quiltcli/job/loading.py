@@ -134,7 +134,11 @@ def _load(model: type[M], found: YamlFile) -> M:
     try:
         loaded = model.model_validate(found.data, context={"base": base})
     except ValidationError as error:
-        raise JobError(_in_order(problems + problems_of(error, model, source))) from None
+        # A value that could not be read is None by now: what that leads to need not be said.
+        known = {(problem.key, problem.line, problem.column) for problem in problems}
+        more = problems_of(error, model, source)
+        problems += [p for p in more if not p.line or (p.key, p.line, p.column) not in known]
+        raise JobError(_in_order(problems)) from None
     if problems:
         raise JobError(problems)
     attach(loaded, source)

@@ -91,7 +91,7 @@ LIGHTS = {"directional": DirectionalLight, "point": PointLight, "ambient": Ambie
 def _check_type(value: Any) -> Any:
     """A light must say which kind it is before its keys can be judged."""
     if not isinstance(value, (dict, Model)):
-        raise complaint(f"expected a light, {{type: {either(list(LIGHTS))}, …}}, got {describe(value)}")
+        raise complaint(f"expected a light such as {{type: ambient}}, got {describe(value)}")
     kind = value.get("type") if isinstance(value, dict) else value.__dict__["type"]
     if kind is None:
         raise complaint(f"missing key (expected {either(list(LIGHTS))})", "type")

@@ -20,17 +20,19 @@ def apply_sets(data: dict[Any, Any], source: Source, sets: Sequence[str]) -> Sou
     Raises:
         JobError: a setting is not KEY=VALUE, or its key cannot be reached.
     """
-    origins = dict(source.origins)
+    origins, marks = dict(source.origins), dict(source.marks)
     problems: list[Problem] = []
     for text in sets:
         option = f"--set {text}"
         try:
-            origins[_apply(data, text)] = option
+            key = _apply(data, text)
+            origins = {path: by for path, by in origins.items() if path[: len(key)] != key} | {key: option}
+            marks = {path: mark for path, mark in marks.items() if path[: len(key)] != key}
         except JobError as error:
             problems += [Problem(problem.message, file=option, key=problem.key) for problem in error.problems]
     if problems:
         raise JobError(problems)
-    return replace(source, origins=origins)
+    return replace(source, origins=origins, marks=marks)
 
 
 def _apply(data: dict[Any, Any], text: str) -> Key:
@@ -66,8 +68,8 @@ def _step(place: Any, part: str | int, above: Key, *, new: bool = False) -> Any:
     if not isinstance(place, list):
         raise JobError(Problem(f"holds {describe(place)}, which has no keys", key=name))
     if not isinstance(part, int) or not 0 <= part < len(place):
-        most = f"0 to {len(place) - 1}" if place else "none, for the list is empty"
-        raise JobError(Problem(f"there is no item {part!r} (expected {most})", key=name))
+        items = "1 item" if len(place) == 1 else f"{len(place)} items"
+        raise JobError(Problem(f"there is no item {part!r} (the list has {items}, from 0)", key=name))
     return place[part]
 
 

@@ -40,12 +40,12 @@ def _is_tag(part: str | int) -> bool:
 def _unknown(key: Key, siblings: Sequence[type[BaseModel]], root: type[BaseModel]) -> str:
     """Unknown key: the nearest known one, or where it belongs, or what there is."""
     names = [name for model in siblings for name in model.model_fields]
-    near = suggest(key[-1], names)
-    if near:
-        return f"unknown key (did you mean {near!r}?)"
     elsewhere = [path for path in _all_keys(root) if path.rpartition(".")[2] == key[-1]]
     if len(elsewhere) == 1:
         return f"unknown key here (did you mean {elsewhere[0]!r}?)"
+    near = suggest(key[-1], names)
+    if near:
+        return f"unknown key (did you mean {near!r}?)"
     return f"unknown key (known: {', '.join(names)})"
 
 
@@ -181,9 +181,10 @@ def version_problem(data: dict[Any, Any], kind: str, source: Source) -> Problem 
         if others:
             words = f"this is a {others[0]} file (a {kind} file was expected)"
             return source.problem((others[0],), words, on_key=True)
-        near = suggest(next(iter(data), ""), [kind])
-        found = f"; found {next(iter(data))!r}" if near else ""
-        return source.problem((), f"the first key must be '{kind}: 1'{found}")
+        for key in data:
+            if suggest(key, [kind]):
+                return source.problem((key,), f"unknown key (did you mean {kind!r}?)", on_key=True)
+        return source.problem((), f"expected '{kind}: 1' as the first key")
     version = data[kind]
     if isinstance(version, int) and not isinstance(version, bool) and version > 1:
         return source.problem((kind,), f"version {version} is newer than this program reads (expected 1)")
@@ -193,4 +194,4 @@ def version_problem(data: dict[Any, Any], kind: str, source: Source) -> Problem 
 
 
 KINDS = ("quilt_display", "quilt_layout", "quilt_scene", "quilt_job")
-NO_KIND = f"this is no file of quilt's (the first key must be {either([f'{kind}: 1' for kind in KINDS])})"
+NO_KIND = f"this is no file of quilt's (expected {either([f'{kind}: 1' for kind in KINDS])} as the first key)"
