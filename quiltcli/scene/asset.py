@@ -77,7 +77,9 @@ def _check_file(path: Path) -> None:
 
 def _damaged(path: Path, missing: list[str]) -> SceneError:
     kind = path.suffix[1:].upper()
-    reason = f"{missing[0]!r} is missing beside it" if missing else "the file is damaged or incomplete"
+    # trimesh looks for another glTF file when it cannot make sense of this one.
+    buffers = [name for name in missing if not name.endswith(".gltf")]
+    reason = f"{buffers[0]!r} is missing beside it" if buffers else "the file is damaged or incomplete"
     return SceneError(Problem(f"cannot be read as {kind}: {reason}", str(path)))
 
 
