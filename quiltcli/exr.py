@@ -131,11 +131,14 @@ def _pixels(path: Path, channels: Mapping[str, Channel]) -> dict[str, Channel]:
 
 
 def _attribute(path: Path, name: str, value: object) -> object:
-    """`value` in a form the library stores unharmed; it cuts integers to 32 bits without a word."""
+    """`value` in a form the library stores unharmed; it cuts numbers to 32 bits without a word."""
     if isinstance(value, np.generic):
         value = value.item()
-    if isinstance(value, int) and not -(2**31) <= value < 2**31:
-        raise OutputError(Problem(f"is {value}, expected an integer of 32 bits", file=str(path), key=name))
+    if isinstance(value, int | Fraction):
+        top, bottom = value.as_integer_ratio()
+        if not (-(2**31) <= top < 2**31 and bottom < 2**32):
+            wrong = f"is {value}, expected an integer or a fraction of 32 bits"
+            raise OutputError(Problem(wrong, file=str(path), key=name))
     return value
 
 
@@ -217,21 +220,10 @@ def is_complete(path: Path, job_sha: str, frame: int) -> bool:
     return attributes.get("quilt:job") == job_sha and attributes.get("quilt:frame") == frame
 
 
-def frame_rate(fps: float | Fraction) -> Fraction:
-    """A frame rate as a fraction; 23.976, 29.97 and their like mean multiples of 1000/1001.
-
-    The tolerance is that of OpenEXR's guessExactFps (ImfFramesPerSecond.h).
-    """
-    exact = Fraction(fps)
-    drop = Fraction(round(exact) * 1000, 1001)
-    near_drop = exact.denominator != 1 and abs(exact - drop) < Fraction(2, 1000)
-    return drop if near_drop else exact.limit_denominator(1001)
-
-
-def frame_attributes(viewer: Viewer, fps: float | Fraction, job_sha: str, version: str) -> dict[str, object]:
+def frame_attributes(viewer: Viewer, fps: Fraction, job_sha: str, version: str) -> dict[str, object]:
     """Attributes of every file of a frame: when, from where, by which job and program."""
     return {
-        "framesPerSecond": frame_rate(fps),
+        "framesPerSecond": Fraction(fps),
         "quilt:frame": int(viewer.frame),
         "quilt:eye": np.asarray(viewer.eye, dtype=np.float32),
         "quilt:look": np.asarray(viewer.look, dtype=np.float32),
