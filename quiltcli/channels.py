@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from quiltcli.geometry import FloatArray
 from quiltcli.raster.hits import Hits
 from quiltcli.scene import Scene
-from quiltcli.shading import shade, shading_normals
+from quiltcli.shading import MOST_HALF, shade, shading_normals
 from quiltcli.viewer import Viewer
 
 Values: TypeAlias = NDArray[Any]
-MOST_HALF = np.float32(65504)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ BLOCK = 16384
 HEADLIGHT = 3.0
 # Lights have no size: below this roughness their image in a surface would be too bright for half floats.
 LEAST_ROUGHNESS = 0.09
+# The largest finite half float; brighter values are written as this.
+MOST_HALF = np.float32(65504)
 _DIELECTRIC = 0.04
 _LEAST_COSINE = np.float32(1e-4)
 _LEAST_DISTANCE2 = np.float32(1e-6)
