@@ -86,8 +86,13 @@ def rectangle(width: float, height: float) -> list[list[float]]:
     return [[0, 0], [width, 0], [width, height], [0, height]]
 
 
+def shifted(polygon: Sequence[Sequence[float]], x: float, y: float) -> FloatArray:
+    """Corners (n, 2) moved by this much."""
+    return np.asarray(polygon, dtype=np.float64) + np.array((x, y))
+
+
 def random_polygons(count: int, low: float, high: float, seed: int) -> list[FloatArray]:
-    """Simple polygons of 3 to 7 corners, some of them concave, between `low` and `high` pixels across."""
+    """Simple polygons of 3 to 7 corners on sixteenths of pixels, some concave, this many pixels across."""
     rng = np.random.default_rng(seed)
     result = []
     for _ in range(count):
@@ -95,5 +100,6 @@ def random_polygons(count: int, low: float, high: float, seed: int) -> list[Floa
         angle = (np.arange(n) + rng.uniform(-0.3, 0.3, n)) * 2 * np.pi / n
         radius = rng.uniform(low, high) / 2 * (rng.uniform(0.4, 1, n) if n > 4 else np.ones(n))
         polygon = np.column_stack((np.cos(angle), np.sin(angle))) * radius[:, None]
+        polygon = np.round(polygon * 16) / 16
         result.append(polygon - polygon.min(axis=0))
     return result

@@ -136,7 +136,8 @@ def test_written_file_replaces_the_old_one_whole(tmp_path):
 BAD = {
     "overlap": (
         ("[1, 0, 5]", "[1, 0, 3]"),
-        "20:21: facets[1].quilt_from_facet: facets 1 and 2 overlap in 3 pixels, the first at (3, 0) of page 1",
+        "20:21: facets[1].quilt_from_facet: facets 1 and 2 overlap in 3 pixels,"
+        " the first at (3, 0) of page 1",
     ),
     "off the page": (
         ("[1, 0, 5]", "[1, 0, 13]"),

@@ -97,8 +97,8 @@ def _strangers(layout: Layout, facets: Facets) -> Iterator[Problem]:
             known[facet - 1] |= layout.page[row] >= 0
     for facet in np.flatnonzero(facets.enabled & ~known):
         name = f" ({facets.names[facet]})" if facets.names[facet] else ""
-        message = f"facet {facet + 1}{name} of {facets.path} has no place; pack again, or disable it"
-        yield layout.problem(message, key="facets")
+        message = f"facet {facet + 1}{name} of {facets.path} has no place; run quilt pack again, or"
+        yield layout.problem(f"{message} disable it", key="facets")
 
 
 def _misfits(layout: Layout, facets: Facets) -> Iterator[Problem]:

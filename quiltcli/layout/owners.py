@@ -144,10 +144,14 @@ def _distance2(point: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
 def _nearest(
     address: IntArray, distance2: FloatArray, facet: Int32Array
 ) -> tuple[IntArray, FloatArray, Int32Array]:
-    """The nearest facet of every address that occurs, the lowest id among equals."""
-    order = np.lexsort((facet, distance2, address))
-    sorted_address = address[order]
-    first = np.ones(order.size, dtype=bool)
-    first[1:] = sorted_address[1:] != sorted_address[:-1]
-    order = order[first]
-    return address[order], distance2[order], facet[order]
+    """The nearest facet of every address that occurs; candidates come in the order of ids."""
+    order = np.argsort(address, kind="stable")
+    address, distance2, facet = address[order], distance2[order], facet[order]
+    first = np.flatnonzero(np.diff(address, prepend=-1))
+    if first.size == 0:
+        return address, distance2, facet
+    least = np.minimum.reduceat(distance2, first)
+    group = np.repeat(np.arange(first.size), np.diff(first, append=address.size))
+    nearest = np.flatnonzero(distance2 == least[group])
+    nearest = nearest[np.diff(group[nearest], prepend=-1) > 0]  # the lowest id among equals
+    return address[nearest], distance2[nearest], facet[nearest]

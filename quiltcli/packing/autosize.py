@@ -20,17 +20,19 @@ _EFFORT = 8000  # facets placed in all tries together
 def pack_auto(method: Method, wanted: PackInput) -> tuple[PackResult, tuple[int, int]]:
     """Try a range of page widths and keep the smallest page; ties go to the squarest, then narrowest.
 
+    A page more than twice as long as wide is taken only when there is no other.
+
     Pages are at most 16384 pixels wide and high; a display too large for one is packed on several
     of that size.
     """
-    best: tuple[tuple[int, int, int], PackResult, tuple[int, int]] | None = None
+    best: tuple[tuple[bool, int, int, int], PackResult, tuple[int, int]] | None = None
     for width in _widths(wanted):
         result = method(replace(wanted, page=(width, LARGEST_PAGE)))
         if page_count(result) > 1:
             continue
         used = (result.corner + placed_size(wanted.size, result.turn)).max(axis=0)
         w, h = (min(_rounded(int(side)), LARGEST_PAGE) for side in used)
-        cost = (w * h, abs(w - h), w)
+        cost = (max(w, h) > 2 * min(w, h), w * h, abs(w - h), w)
         if best is None or cost < best[0]:
             best = (cost, result, (w, h))
     if best is not None:
