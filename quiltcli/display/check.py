@@ -82,7 +82,7 @@ def _one_sided(corners: FloatArray, start: IntArray) -> Iterator[tuple[int, str]
 
 
 def _planar(corners: FloatArray, start: IntArray) -> Iterator[tuple[int, str]]:
-    row, rank = segments(start)
+    row, _ = segments(start)
     count = np.diff(start)[:, None]
     centre = np.add.reduceat(corners, start[:-1], axis=0) / count
     normal = normalized(area_vectors(corners, start))
@@ -90,10 +90,9 @@ def _planar(corners: FloatArray, start: IntArray) -> Iterator[tuple[int, str]]:
     worst = np.maximum.reduceat(off, start[:-1])
     limit = PLANAR * diameters(corners, start)
     for facet in np.flatnonzero(worst > limit):
-        corner = int(rank[start[facet] + np.argmax(off[start[facet] : start[facet + 1]])]) + 1
         yield (
             int(facet),
-            f"not planar: corner {corner} lies {worst[facet]:.3g} m off its plane "
+            f"not planar: its corners lie up to {worst[facet]:.3g} m off its plane "
             f"(expected at most {limit[facet]:.3g} m, {PLANAR:g} of its size)",
         )
 
