@@ -47,12 +47,11 @@ def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
     )
     front = normalized(area_vectors(corners, start))
     normal = -front if spec.viewing_side == "back" else front
-    _raise(list(_useless_ups(normal, names, spec)), spec)
     right, down = _axes(corners, start, front, normal, spec)
     mirrored = np.array([choice.mirror for choice in chosen])
     right = np.where(mirrored[:, None], -right, right)
     frame = _rasters(corners, start, right, down, spec)
-    _raise(list(_impossible_sizes(frame.size, names, spec)), spec)
+    _raise([*_useless_ups(normal, names, spec), *_impossible_sizes(frame.size, names, spec)], spec)
     return Facets(
         names=names,
         corner_start=start,
