@@ -1,0 +1,248 @@
+"""Write the meshes of this folder's scenes.
+
+    python scenes/generate.py [NAME…]
+
+Everything is built from formulas, so the same program always writes the same bytes. Meshes are OBJ
+in metres with Y up; each stands on the ground with its middle at the origin unless its line below
+says otherwise. Where a mesh has several materials, these are in an MTL file beside it. The scene files are
+written by hand: they say where things stand, what they are made of and how they are lit.
+
+To add a mesh, write a function that returns a `Mesh` and add a row to `MESHES`.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "display_models"))
+
+from shapes import Mesh, grid, icosahedron, revolved, tube  # noqa: E402  # stand in the folder added above
+from teapot import teapot_patches  # noqa: E402
+
+FloatArray = NDArray[np.float64]
+
+# Linear reflectances of the meshes that have materials of their own.
+PALETTE = {
+    "cream": (0.62, 0.55, 0.43),
+    "slate": (0.045, 0.06, 0.085),
+    "rim": (0.12, 0.085, 0.06),
+    "oak": (0.34, 0.19, 0.085),
+    "walnut": (0.11, 0.055, 0.028),
+    "chalk": (0.66, 0.64, 0.58),
+    "sage": (0.19, 0.29, 0.21),
+    "clay": (0.46, 0.19, 0.105),
+    "dusk": (0.085, 0.14, 0.25),
+}
+
+
+def teapot() -> Mesh:
+    """The Utah teapot, a tenth of Newell's units in metres, every patch 10 × 10 quads."""
+    t = np.arange(11) / 10
+    basis = np.stack(((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3), axis=1)
+    mesh = Mesh()
+    for patch in teapot_patches():
+        points = np.einsum("ik,jl,klc->ijc", basis, basis, patch)
+        world = np.stack((points[..., 0], points[..., 2], -points[..., 1]), axis=2) * 0.1
+        grid(mesh, world[::-1])
+    return mesh
+
+
+def knot() -> Mesh:
+    """A (2, 3) torus knot lying flat, 1 m across, its tube 0.16 m thick."""
+    t = np.linspace(0, 2 * math.pi, 181)
+    t[-1] = 0
+
+    def curve(s: FloatArray) -> FloatArray:
+        r = 0.3 + 0.12 * np.cos(3 * s)
+        return np.stack((r * np.cos(2 * s), 0.12 * np.sin(3 * s) + 0.2, -r * np.sin(2 * s)), axis=1)
+
+    step = 1e-4
+    before, here, after = curve(t - step), curve(t), curve(t + step)
+    mesh = Mesh()
+    tube(mesh, here, (after - before) / (2 * step), (after - 2 * here + before) / step**2, 0.08, 18)
+    return mesh
+
+
+def ball() -> Mesh:
+    """A sphere of 1 m diameter around the origin."""
+    turns = [math.pi * k / 32 for k in range(33)]
+    return revolved([(0.5 * math.sin(t), -0.5 * math.cos(t)) for t in turns], 64)
+
+
+def cone() -> Mesh:
+    """A cone 1 m wide and high."""
+    steps = [k / 6 for k in range(7)]
+    return revolved([(0, 0), *((0.5 * (1 - s), s) for s in steps)], 64)
+
+
+def cylinder() -> Mesh:
+    """A cylinder 1 m wide and high."""
+    return revolved([(0, 0), (0.5, 0), (0.5, 1), (0, 1)], 64)
+
+
+def cube() -> Mesh:
+    """A cube of 1 m."""
+    mesh = Mesh()
+    box(mesh, (-0.5, 0, -0.5), (0.5, 1, 0.5))
+    return mesh
+
+
+def box(mesh: Mesh, low: tuple[float, float, float], high: tuple[float, float, float]) -> None:
+    """Add the six sides of a box."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    first = mesh.add_points([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (z0, z1)])
+    for side in ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)):
+        mesh.faces.append(tuple(first + corner for corner in side))
+
+
+def checker(mesh: Mesh, low: float, high: float, cells: int, colors: tuple[str, str]) -> None:
+    """Add a square floor of tiles at height 0."""
+    edge = np.linspace(low, high, cells + 1)
+    for i in range(cells):
+        for j in range(cells):
+            tile = [
+                (edge[i], edge[j + 1]),
+                (edge[i + 1], edge[j + 1]),
+                (edge[i + 1], edge[j]),
+                (edge[i], edge[j]),
+            ]
+            paint(mesh, colors[(i + j) % 2])
+            first = mesh.add_points([(x, 0, z) for x, z in tile])
+            mesh.faces.append(tuple(range(first, first + 4)))
+
+
+def paint(mesh: Mesh, name: str) -> None:
+    """Let the faces that follow have a material."""
+    mesh.names[len(mesh.faces)] = name
+
+
+def board() -> Mesh:
+    """A board of 8 × 8 tiles, 1 m wide, with a rim; its top is at height 0."""
+    mesh = Mesh()
+    checker(mesh, -0.46, 0.46, 8, ("cream", "slate"))
+    paint(mesh, "rim")
+    frame = [(0.46, 0.0), (0.5, -0.008), (0.5, -0.03), (0.46, -0.03)]
+    corners = [(-1, 1), (1, 1), (1, -1), (-1, -1), (-1, 1)]
+    grid(mesh, np.array([[(r * x, y, r * z) for x, z in corners] for r, y in reversed(frame)]))
+    return mesh
+
+
+def dish() -> Mesh:
+    """A round board of tiles in five rings, 1 m wide, with a rim; its top is at height 0."""
+    mesh = Mesh()
+    sides = 48
+
+    def ring(r: float, y: float) -> list[tuple[float, float, float]]:
+        turns = [2 * math.pi * (k % sides) / sides for k in range(sides + 1)]
+        return [(r * math.sin(t), y, r * math.cos(t)) for t in turns]
+
+    radii = np.linspace(0, 0.46, 6)
+    for i in range(5):
+        inner, outer = ring(radii[i], 0), ring(radii[i + 1], 0)
+        for k in range(sides):
+            paint(mesh, ("cream", "slate")[(i + k // 4) % 2])
+            grid_of = [[outer[k], outer[k + 1]], [inner[k], inner[k + 1]]]
+            grid(mesh, np.array(grid_of))
+    paint(mesh, "rim")
+    grid(mesh, np.array([ring(0.46, -0.03), ring(0.5, -0.03), ring(0.5, -0.008), ring(0.46, 0)]))
+    return mesh
+
+
+def plate() -> Mesh:
+    """A thin upright plate, 1 m × 0.7 m × 4 mm around the origin."""
+    mesh = Mesh()
+    box(mesh, (-0.5, -0.35, -0.002), (0.5, 0.35, 0.002))
+    return mesh
+
+
+def room() -> Mesh:
+    """A room of 6 m × 6 m, 3.2 m high, seen from inside: tiled floor, coloured walls, a beamed ceiling."""
+    mesh = Mesh()
+    checker(mesh, -3, 3, 12, ("chalk", "dusk"))
+    h, w = 3.2, 3.0
+    walls = {
+        "sage": [(-w, -w), (w, -w)],
+        "clay": [(w, -w), (w, w)],
+        "cream": [(w, w), (-w, w)],
+        "dusk": [(-w, w), (-w, -w)],
+    }
+    for color, ((x0, z0), (x1, z1)) in walls.items():
+        paint(mesh, color)
+        grid(mesh, np.array([[(x0, 0.12, z0), (x1, 0.12, z1)], [(x0, h, z0), (x1, h, z1)]]))
+        paint(mesh, "walnut")
+        grid(mesh, np.array([[(x0, 0, z0), (x1, 0, z1)], [(x0, 0.12, z0), (x1, 0.12, z1)]]))
+    paint(mesh, "chalk")
+    grid(mesh, np.array([[(-w, h, -w), (w, h, -w)], [(-w, h, w), (w, h, w)]]))
+    paint(mesh, "oak")
+    for x in (-2.25, -0.75, 0.75, 2.25):
+        box(mesh, (x - 0.09, h - 0.16, -w), (x + 0.09, h, w))
+    return mesh
+
+
+def table() -> Mesh:
+    """A table 1.2 m × 0.7 m, 0.74 m high."""
+    mesh = Mesh()
+    paint(mesh, "oak")
+    box(mesh, (-0.6, 0.70, -0.35), (0.6, 0.74, 0.35))
+    paint(mesh, "walnut")
+    for x in (-0.56, 0.49):
+        for z in (-0.31, 0.24):
+            box(mesh, (x, 0, z), (x + 0.07, 0.70, z + 0.07))
+    return mesh
+
+
+MESHES: dict[str, Callable[[], Mesh]] = {
+    "teapot": teapot,
+    "knot": knot,
+    "icosahedron": icosahedron,
+    "ball": ball,
+    "cone": cone,
+    "cylinder": cylinder,
+    "cube": cube,
+    "board": board,
+    "dish": dish,
+    "plate": plate,
+    "room": room,
+    "table": table,
+}
+
+
+def obj_text(name: str) -> str:
+    """A mesh as OBJ, to a micrometre."""
+    mesh = MESHES[name]()
+    lines = [f"# {name}: made by generate.py, metres, Y up"]
+    if mesh.names:
+        lines.append(f"mtllib {name}.mtl")
+    lines += ["v " + " ".join(f"{round(c, 6) + 0.0:.6g}" for c in point) for point in mesh.vertices]
+    current = ""
+    for index, face in enumerate(mesh.faces):
+        if mesh.names.get(index, current) != current:
+            current = mesh.names[index]
+            lines.append(f"usemtl {current}")
+        lines.append("f " + " ".join(str(corner + 1) for corner in face))
+    return "\n".join(lines) + "\n"
+
+
+def mtl_text(name: str) -> str:
+    """The materials a mesh uses, empty when it has none of its own."""
+    used = sorted(set(MESHES[name]().names.values()) & PALETTE.keys())
+    return "".join(f"newmtl {m}\nKd {' '.join(map(str, PALETTE[m]))}\nNs 30\n" for m in used)
+
+
+def write(folder: Path, names: Iterable[str]) -> None:
+    """Write meshes, and their materials, into a folder."""
+    for name in names:
+        (folder / f"{name}.obj").write_text(obj_text(name), encoding="utf-8")
+        if materials := mtl_text(name):
+            (folder / f"{name}.mtl").write_text(materials, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write(HERE, sys.argv[1:] or MESHES)
