@@ -56,8 +56,8 @@ def draw_layout(layout: Layout, names: Sequence[str] = ()) -> Drawing:
     columns = _columns(layout)
     rows = math.ceil(len(layout.pages) / columns)
     widest, highest = (int(side) for side in layout.pages.max(axis=0))
-    across = _WIDEST - _MARGIN * (columns + 1)
-    down = _WIDEST - _HEADER - (_TITLE + _MARGIN) * rows
+    across = _WIDEST - 1 - _MARGIN * (columns + 1)
+    down = _WIDEST - 1 - _HEADER - (_TITLE + _MARGIN) * rows
     scale = min(across / (columns * widest), down / (rows * highest))
     cell = np.array([widest * scale + _MARGIN, highest * scale + _TITLE + _MARGIN])
     width = max(math.ceil(columns * cell[0]) + _MARGIN, 640)
@@ -111,17 +111,18 @@ def _facet(layout: Layout, row: int, polygon: FloatArray, names: Sequence[str]) 
     hue = (facet * 0.6180339887) % 1
     yield Shape(polygon, _color(hue, 0.82, 0.5), _color(hue, 1.0, 0.3), 1)
     centre, radius = _roomiest(polygon)
-    size = min(1.05 * radius / max(1.0, 0.45 * len(str(facet))), 40)
+    size = min(1.05 * radius / max(1.0, 0.45 * len(str(facet))), 64)
     if size < 5:
         return
     yield Label(centre[0], centre[1], size, str(facet), _FACET_INK, "middle")
     up = -layout.quilt_from_facet[row, :, 1]
     up = up / np.linalg.norm(up)
-    if radius > 14:
+    if radius > 14:  # room for an arrow
         across = np.array([-up[1], up[0]])
-        tip = centre + up * radius * 0.94
-        base = centre + up * radius * 0.76
-        arrow = np.stack((tip, base + across * radius * 0.14, base - across * radius * 0.14))
+        reach, half = radius * 0.94, min(radius * 0.14, 30)
+        tip = centre + up * reach
+        base = tip - up * half * 1.3
+        arrow = np.stack((tip, base + across * half, base - across * half))
         yield Shape(arrow, _FACET_INK, _FACET_INK, 0)
     name = names[facet - 1] if facet <= len(names) else ""
     small = min(size * 0.5, 2.4 * radius / max(1, len(name)))

@@ -18,21 +18,20 @@ _EFFORT = 8000  # facets placed in all tries together
 
 
 def pack_auto(method: Method, wanted: PackInput) -> tuple[PackResult, tuple[int, int]]:
-    """Try a range of page widths and keep the smallest page; ties go to the squarest, then narrowest.
+    """Try a range of page widths and keep the smallest page.
 
-    A page more than twice as long as wide is taken only when there is no other.
-
-    Pages are at most 16384 pixels wide and high; a display too large for one is packed on several
-    of that size.
+    Ties go to the squarest, then the one with fewest turned facets, then the narrowest. A page more
+    than three times as long as wide is taken only when there is no other. Pages are at most 16384
+    pixels wide and high; a display too large for one is packed on several of that size.
     """
-    best: tuple[tuple[bool, int, int, int], PackResult, tuple[int, int]] | None = None
+    best: tuple[tuple[bool, int, int, int, int], PackResult, tuple[int, int]] | None = None
     for width in _widths(wanted):
         result = method(replace(wanted, page=(width, LARGEST_PAGE)))
         if page_count(result) > 1:
             continue
         used = (result.corner + placed_size(wanted.size, result.turn)).max(axis=0)
         w, h = (min(_rounded(int(side)), LARGEST_PAGE) for side in used)
-        cost = (max(w, h) > 2 * min(w, h), w * h, abs(w - h), w)
+        cost = (max(w, h) > 3 * min(w, h), w * h, abs(w - h), int(np.count_nonzero(result.turn)), w)
         if best is None or cost < best[0]:
             best = (cost, result, (w, h))
     if best is not None:
@@ -46,7 +45,7 @@ def _rounded(pixels: int) -> int:
 
 
 def _widths(wanted: PackInput) -> list[int]:
-    """Page widths from 0.8 to 1.4 times the side of a square of the facets' area, each once, ascending.
+    """Page widths from 0.8 to 1.4 times a square of the facets' area, and that of the widest facet.
 
     Large displays get fewer tries: their pages fill about as well at any width.
     """
@@ -54,5 +53,5 @@ def _widths(wanted: PackInput) -> list[int]:
     narrowest = int(wanted.size.min(axis=1).max())
     tries = max(3, min(_WIDTHS, _EFFORT // len(wanted.size)))
     sides = math.sqrt(area) * np.linspace(0.8, 1.4, tries)
-    widths = {_rounded(max(int(side), narrowest)) for side in sides}
+    widths = {_rounded(max(int(side), narrowest)) for side in (*sides, wanted.size[:, 0].max())}
     return sorted(width for width in widths if width <= LARGEST_PAGE) or [LARGEST_PAGE]
