@@ -100,8 +100,8 @@ def _cells(line: str, number: int) -> list[_Cell]:
 
 
 def _header(row: list[_Cell], path: Path) -> tuple[str, ...]:
-    """Column names, or none when the first row holds numbers."""
-    if _is_number(row[0].text) or not row[0].text:
+    """Column names, or none when the first row does not start with a word."""
+    if not row[0].text[:1].isalpha():
         return ()
     names = [_SHORT.get(cell.text.lower(), cell.text.lower()) for cell in row]
     problems = []

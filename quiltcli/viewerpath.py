@@ -15,6 +15,7 @@ from quiltcli.errors import ViewerError
 from quiltcli.geometry import FloatArray, normalized
 from quiltcli.job import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec
 from quiltcli.viewercsv import Track, read_track
+from quiltcli.yamlfile import Source
 
 
 @dataclass(frozen=True)
@@ -126,29 +127,30 @@ def csv_pose(path: PathSpec, frame: int) -> Pose:
     spec = path.csv
     assert spec is not None
     track = read_track(spec.file)
-    row = _track_row(spec, track, frame)
+    blame = path.source.at("csv")
+    row = _track_row(spec, track, frame, blame)
     eye = row[0:3] * spec.metres
     if track.aim == "look_at":
         look = row[3:6] * spec.metres - eye
     elif track.aim == "look":
         look = row[3:6]
     else:
-        look = _given_aim(spec, eye)
+        look = _given_aim(spec, eye, blame)
     up = row[-3:] if track.has_up else np.asarray(spec.up, dtype=np.float64)
     return Pose(eye, look, up, ("csv",))
 
 
-def _given_aim(spec: CsvSpec, eye: FloatArray) -> FloatArray:
+def _given_aim(spec: CsvSpec, eye: FloatArray, blame: Source) -> FloatArray:
     """Direction of view from the job, for files that hold positions only."""
     if spec.look is not None:
         return np.asarray(spec.look, dtype=np.float64)
     if spec.look_at is None:
         words = f"{spec.file} holds positions only (add look_at, a point, or look, a direction)"
-        raise ViewerError(spec.source.problem((), words))
+        raise ViewerError(blame.problem((), words))
     return np.asarray(spec.look_at, dtype=np.float64) - eye
 
 
-def _track_row(spec: CsvSpec, track: Track, frame: int) -> FloatArray:
+def _track_row(spec: CsvSpec, track: Track, frame: int, blame: Source) -> FloatArray:
     """Numbers of a frame, from its row or from between two rows."""
     at = int(np.searchsorted(track.frames, frame))
     if at < track.frames.size and track.frames[at] == frame:
@@ -157,7 +159,7 @@ def _track_row(spec: CsvSpec, track: Track, frame: int) -> FloatArray:
     first, last = int(track.frames[0]), int(track.frames[-1])
     if not first < frame < last:
         words = f"frame {frame} is not in {spec.file} (it holds frames {first} to {last})"
-        raise ViewerError(spec.source.problem((), words))
+        raise ViewerError(blame.problem((), words))
     if not spec.fill:
         before, after = int(track.frames[at - 1]), int(track.frames[at])
         words = f"frame {frame} is missing between {before} and {after} (add it, or set fill: true)"

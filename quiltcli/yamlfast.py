@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from yaml.cyaml import CParser
+from yaml.cyaml import CParser  # type: ignore[attr-defined]
 
 from quiltcli.yamlsyntax import CoreResolver
 

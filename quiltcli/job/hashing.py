@@ -78,7 +78,8 @@ def _uris(data: Any) -> Iterator[str]:
     if not isinstance(data, dict):
         return
     for kind in ("buffers", "images"):
-        for item in data.get(kind) or ():
+        items = data.get(kind)
+        for item in items if isinstance(items, list) else ():
             if isinstance(item, dict) and isinstance(item.get("uri"), str):
                 yield item["uri"]
 

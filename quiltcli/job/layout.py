@@ -23,7 +23,6 @@ from quiltcli.job.base import (
     Vec3,
 )
 
-
 # Names of the packing stage, which comes later; known here so that a wrong one is shown in its line.
 PACKING_METHODS = ("maxrects", "rows")
 

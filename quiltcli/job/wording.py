@@ -27,6 +27,8 @@ def problems_of(error: ValidationError, model: type[BaseModel], source: Source) 
         elif details["loc"][-1:] == ("[key]",):
             text = f"expected a whole number from 1 as key, got {describe(key[-1])}"
             found.append(source.problem(key, text, on_key=True))
+        elif details["type"] == "missing":
+            found.append(source.problem(key, _missing(key, _models_at(model, details["loc"]))))
         else:
             found.append(source.problem(key, _sentence(details)))
     return found
@@ -35,6 +37,15 @@ def problems_of(error: ValidationError, model: type[BaseModel], source: Source) 
 def _is_tag(part: str | int) -> bool:
     """Parts of pydantic's location that stand for a choice, not for a key of the file."""
     return isinstance(part, str) and (part.startswith("<") or part == "[key]")
+
+
+def _missing(key: Key, siblings: Sequence[type[BaseModel]]) -> str:
+    """Missing key, and what it is for."""
+    about = [m.model_fields[str(key[-1])].description for m in siblings if key[-1] in m.model_fields]
+    text = (about[0] if about and about[0] else "").rstrip(".")
+    if text[1:2].islower():
+        text = text[0].lower() + text[1:]
+    return f"missing key ({text})" if text else "missing key"
 
 
 def _unknown(key: Key, siblings: Sequence[type[BaseModel]], root: type[BaseModel]) -> str:
@@ -152,7 +163,6 @@ def _short(value: Any, ctx: dict[str, Any]) -> str:
 
 
 _SENTENCES: dict[str, Callable[[Any, dict[str, Any]], str]] = {
-    "missing": lambda value, ctx: "missing key",
     "float_type": _number,
     "int_type": _whole,
     "int_from_float": _whole,
