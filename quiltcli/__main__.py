@@ -1,6 +1,6 @@
 """`python -m quiltcli` is the same program as `quilt`."""
 
-from quiltcli.cli import main
+from quiltcli.cli import run
 
 if __name__ == "__main__":
-    main()
+    run()

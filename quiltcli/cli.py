@@ -1,8 +1,287 @@
-"""The command line: parse, call one library function a command, print."""
+"""The command line: parse, call one library function a command, print.
+
+Nothing heavy is imported before a command runs, so `quilt --help` answers at once. Results go to
+stdout, everything else to stderr; `Quilt.invoke` is the one place that turns an error into a message
+and an exit code.
+"""
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
 
-def main() -> None:
-    """Run the `quilt` command."""
-    raise SystemExit(0)
+import click
+
+from quiltcli import __version__
+from quiltcli.errors import JobError, QuiltError
+
+T = TypeVar("T")
+PATH = click.Path(path_type=Path)
+
+
+class Quilt(click.Group):
+    """The `quilt` command."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; errors that are the user's to mend become one line a problem."""
+        try:
+            return super().invoke(ctx)
+        except QuiltError as error:
+            if ctx.params.get("debug"):
+                raise
+            click.echo(f"error: {error}" if len(error.problems) == 1 else str(error), err=True)
+            ctx.exit(error.exit_code)
+        except KeyboardInterrupt:
+            ctx.exit(130)
+        except MemoryError:
+            if ctx.params.get("debug"):
+                raise
+            click.echo("error: not enough memory (smaller pages or fewer threads need less)", err=True)
+            ctx.exit(1)
+
+
+class Parsed(click.ParamType):  # type: ignore[type-arg] # generic only in some versions of click
+    """A value that a function of the library reads from text."""
+
+    def __init__(self, name: str, read: Callable[[str], Any]) -> None:
+        self.name = name
+        self.read = read
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The value, or a usage error with the library's own words."""
+        if not isinstance(value, str):
+            return value
+        try:
+            return self.read(value)
+        except ValueError as error:
+            return self.fail(str(error), param, ctx)
+
+
+def _frames(text: str) -> tuple[int, ...]:
+    from quiltcli.frames import parse_frames
+
+    return parse_frames(text)
+
+
+def _facets(text: str) -> tuple[int, ...]:
+    from quiltcli.frames import parse_facets
+
+    return parse_facets(text)
+
+
+def _size(text: str) -> tuple[int, int] | None:
+    if text == "auto":
+        return None
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdigit() and height.isdigit() and int(width) and int(height)):
+        raise JobError(f"expected WIDTHxHEIGHT in pixels, such as 8192x8192, or auto, got {text!r}")
+    return int(width), int(height)
+
+
+FRAMES = Parsed("frames", _frames)
+FACETS = Parsed("facets", _facets)
+SIZE = Parsed("size", _size)
+
+
+@click.group(
+    cls=Quilt, context_settings={"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "QUILT"}
+)
+@click.version_option(__version__, prog_name="quilt")
+@click.option("--debug", is_flag=True, help="Show tracebacks.")
+def main(debug: bool) -> None:
+    """Render perspectively correct 3D for multiplanar displays.
+
+    A display is a set of flat facets; a quilt is the packed image of them all. (No patch stack, and
+    no Looking Glass grid of views.) The same program answers to quiltcli.
+    """
+
+
+@main.command()
+@click.argument("job", type=PATH)
+@click.option("-f", "--frames", type=FRAMES, help="Frames such as 1-240, 1-9x2 or 1,5,20-30; inclusive.")
+@click.option("-o", "--output", type=PATH, help="Output folder, instead of the job's.")
+@click.option("--resume", is_flag=True, help="Skip frames that are complete and made by the same job.")
+@click.option("--overwrite", is_flag=True, help="Replace images that exist.")
+@click.option("--facets", type=FACETS, help="Draw only these facets, such as 3,7-9, into existing quilts.")
+@click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
+@click.option("--scheduler", metavar="ADDRESS", help="Hand the frames to a dask scheduler.")
+@click.option("--dry-run", is_flag=True, help="Find every problem, write nothing.")
+@click.option(
+    "--set", "sets", metavar="KEY=VALUE", multiple=True, help="Set a value of the job, by dotted path."
+)
+def render(
+    job: Path,
+    frames: tuple[int, ...] | None,
+    output: Path | None,
+    resume: bool,
+    overwrite: bool,
+    facets: tuple[int, ...] | None,
+    threads: int | None,
+    scheduler: str | None,
+    dry_run: bool,
+    sets: tuple[str, ...],
+) -> None:
+    """Render the frames of JOB: quilts, facet images, report."""
+    from quiltcli.job import load_job
+    from quiltcli.render import RenderOptions
+
+    if resume and overwrite:
+        raise click.UsageError("--resume keeps finished frames and --overwrite replaces them: give one")
+    options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run)
+    loaded = load_job(job, sets)
+    if scheduler is not None:
+        from quiltcli.farm import render_on
+
+        render_on(scheduler, job, sets, loaded, options)
+        return
+    _render_here(loaded, options)
+
+
+def _render_here(job: Any, options: Any) -> None:
+    """Render on this machine, with progress on stderr and the summary on stdout."""
+    from quiltcli.interrupt import Stopped
+    from quiltcli.progress import progress
+    from quiltcli.render import Listener, render
+    from quiltcli.report import summary_warnings
+
+    with progress() as shown:
+        try:
+            records = render(job, options, Listener(shown.begin, shown.frame_done, shown.say))
+        except Stopped as stopped:
+            shown.say(str(stopped))
+            sys.exit(stopped.exit_code)
+    for warning in summary_warnings(records):
+        click.echo(f"warning: {warning}", err=True)
+    if options.dry_run:
+        click.echo("nothing is wrong with this job")
+    elif records:
+        _print_summary(records)
+        click.echo(f"written to {options.folder or job.output.directory}")
+    else:
+        click.echo("every frame is complete already")
+
+
+def _print_summary(records: Any) -> None:
+    """The summary table, plain where stdout is no terminal."""
+    from rich.console import Console
+
+    from quiltcli.report import summary, summary_table
+
+    if sys.stdout.isatty():
+        Console().print(summary_table(records))
+        return
+    for label, value in summary(records):
+        click.echo(f"{label:<24}{value}")
+
+
+@main.command()
+@click.argument("display", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="Layout file to write.")
+@click.option("--method", help="Packing method.")
+@click.option("--size", type=SIZE, help="Page size such as 8192x8192; auto takes the smallest page.")
+@click.option("--max-pages", type=click.IntRange(min=1), help="Most pages that may be used.")
+@click.option(
+    "--padding", type=click.IntRange(min=0), default=2, show_default=True, help="Pixels between facets."
+)
+@click.option("--picture", type=PATH, help="Draw the layout, as .png or .svg.")
+def pack(
+    display: Path,
+    output: Path,
+    method: str | None,
+    size: tuple[int, int] | None,
+    max_pages: int | None,
+    padding: int,
+    picture: Path | None,
+) -> None:
+    """Make a facet layout for DISPLAY; print its fill and pages."""
+    from quiltcli.display import load_display
+    from quiltcli.job import load_display_file
+    from quiltcli.layout import fill, layout_picture, write_layout
+    from quiltcli.packing import DEFAULT_METHOD
+    from quiltcli.packing import pack as pack_facets
+
+    facets = load_display(load_display_file(display))
+    layout = pack_facets(facets, method or DEFAULT_METHOD, size, padding, max_pages)
+    write_layout(layout, output)
+    if picture is not None:
+        layout_picture(layout, picture, facets.names)
+    pages = layout.pages.tolist()
+    click.echo(f"fill {100 * fill(layout):.1f} %")
+    click.echo(f"pages {len(pages)} of {pages[0][0]}×{pages[0][1]} pixels")
+
+
+@main.command()
+@click.argument("files", nargs=-1, required=True, type=PATH)
+def check(files: tuple[Path, ...]) -> None:
+    """Read FILES strictly and report every problem found."""
+    from quiltcli.checking import check_files
+
+    problems = check_files(files)
+    for problem in problems:
+        click.echo(str(problem))
+    if problems:
+        sys.exit(1)
+    click.echo(f"{len(files)} file{'s' * (len(files) > 1)}: nothing is wrong", err=True)
+
+
+@main.command()
+@click.argument("quilts", nargs=-1, required=True, type=PATH)
+@click.option("--layout", type=PATH, required=True, help="The layout the quilts were made for.")
+@click.option("-o", "--output", type=PATH, required=True, help="Folder for the facet images.")
+@click.option("--overwrite", is_flag=True, help="Replace images that exist.")
+def unmap(quilts: tuple[Path, ...], layout: Path, output: Path, overwrite: bool) -> None:
+    """Cut facet images out of existing QUILTS."""
+    from quiltcli.layout import read_layout
+    from quiltcli.unmapfiles import unmap as unmap_quilts
+
+    written = unmap_quilts(quilts, read_layout(layout), output, overwrite=overwrite)
+    click.echo(f"{len(written)} facet images in {output / 'facets'}")
+
+
+@main.command()
+@click.argument("a", type=PATH)
+@click.argument("b", type=PATH)
+@click.option("--fail", type=float, default=0.0, show_default=True, help="Difference a pixel may not exceed.")
+@click.option("--fail-percent", type=float, default=0.0, show_default=True, help="Share of pixels that may.")
+@click.option("--hard-fail", type=float, help="Difference no pixel may exceed.")
+@click.option("--warn", type=float, help="Difference that is worth a warning.")
+@click.option(
+    "--warn-percent", type=float, default=0.0, show_default=True, help="Share of pixels that may have it."
+)
+def diff(a: Path, b: Path, **limits: Any) -> None:
+    """Compare two images, EXR sequences or output folders, all parts and channels.
+
+    Exit codes are idiff's: 0 match, 1 warning, 2 failure, 3 size, 4 file error.
+    """
+    from quiltcli.diff import COLUMNS, Limits, diff_rows
+    from quiltcli.diff import diff as compare
+
+    result = compare(a, b, Limits(**{name: value for name, value in limits.items() if value is not None}))
+    _print_rows(COLUMNS, diff_rows(result))
+    sys.exit(result.code)
+
+
+def _print_rows(columns: Any, rows: Any) -> None:
+    """A table on stdout: drawn on a terminal, separated by tabs elsewhere."""
+    if not sys.stdout.isatty():
+        for row in (columns, *rows):
+            click.echo("\t".join(row))
+        return
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(*columns, box=SIMPLE, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)
+
+
+def run() -> None:
+    """Entry point: numerical libraries are told to stay on one thread, the renderer has its own."""
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    main.main(prog_name=Path(sys.argv[0]).name if "__main__" not in sys.argv[0] else "quilt")

@@ -16,25 +16,31 @@ class Progress:
     """What a run tells while it works.
 
     Attributes:
+        begin: to be called with the number of frames to come.
         frame_done: to be called when a frame's files are all there.
         say: a line for the user between the frames.
     """
 
+    begin: Callable[[int], None]
     frame_done: Callable[[FrameRecord], None]
     say: Callable[[str], None]
 
 
 @contextlib.contextmanager
-def progress(frames: int, stream: TextIO | None = None) -> Iterator[Progress]:
-    """Show the progress of a run of so many frames on `stream` (stderr)."""
+def progress(stream: TextIO | None = None) -> Iterator[Progress]:
+    """Show the progress of a run on `stream` (stderr)."""
     stream = stream or sys.stderr
-    with (_bar if stream.isatty() else _lines)(frames, stream) as shown:
+    with (_bar if stream.isatty() else _lines)(stream) as shown:
         yield shown
 
 
 @contextlib.contextmanager
-def _lines(frames: int, stream: TextIO) -> Iterator[Progress]:
-    done = 0
+def _lines(stream: TextIO) -> Iterator[Progress]:
+    frames = done = 0
+
+    def begin(count: int) -> None:
+        nonlocal frames
+        frames = count
 
     def say(line: str) -> None:
         stream.write(f"{line}\n")
@@ -45,11 +51,11 @@ def _lines(frames: int, stream: TextIO) -> Iterator[Progress]:
         done += 1
         say(f"frame {record.frame} ({done} of {frames}): {frame_line(record)}")
 
-    yield Progress(frame_done, say)
+    yield Progress(begin, frame_done, say)
 
 
 @contextlib.contextmanager
-def _bar(frames: int, stream: TextIO) -> Iterator[Progress]:
+def _bar(stream: TextIO) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as RichProgress
@@ -57,7 +63,10 @@ def _bar(frames: int, stream: TextIO) -> Iterator[Progress]:
     columns = (TextColumn("rendering"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     last = TextColumn("{task.description}")
     with RichProgress(*columns, last, console=Console(file=stream)) as bar:
-        task = bar.add_task("", total=frames)
+        task = bar.add_task("", total=None)
+
+        def begin(count: int) -> None:
+            bar.update(task, total=count)
 
         def frame_done(record: FrameRecord) -> None:
             bar.update(task, advance=1, description=f"frame {record.frame}: {frame_line(record)}")
@@ -65,7 +74,7 @@ def _bar(frames: int, stream: TextIO) -> Iterator[Progress]:
         def say(line: str) -> None:
             bar.console.print(line, markup=False, highlight=False)
 
-        yield Progress(frame_done, say)
+        yield Progress(begin, frame_done, say)
 
 
 def frame_line(record: FrameRecord) -> str:

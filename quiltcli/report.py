@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ class FrameRecord:
     Attributes:
         frame: frame number.
         triangles: scene triangles that went into binning.
+        reaching: those of them that reach a facet.
         pairs: (triangle, facet) pairs after binning.
         settled: triangles that the first pass of binning settled.
         lit_facets: facets whose lit side faces the eye.
@@ -37,6 +39,7 @@ class FrameRecord:
 
     frame: int
     triangles: int
+    reaching: int
     pairs: int
     settled: int
     lit_facets: int
@@ -47,13 +50,19 @@ class FrameRecord:
 
     @property
     def settled_share(self) -> float:
-        """Share of the triangles that the first pass settled, 0 to 1 (1 without triangles)."""
-        return self.settled / self.triangles if self.triangles else 1.0
+        """Share of the triangles reaching a facet that the first pass settled, 0 to 1 (1 if none does)."""
+        return self.settled / self.reaching if self.reaching else 1.0
 
     @property
     def replication(self) -> float:
-        """Pairs per triangle (0 without triangles)."""
-        return self.pairs / self.triangles if self.triangles else 0.0
+        """Pairs per triangle that reaches a facet (0 if none does)."""
+        return self.pairs / self.reaching if self.reaching else 0.0
+
+    def timed(self, stage: str, work: Callable[[], object]) -> FrameRecord:
+        """Do `work`; the record with the time it took under `stage`."""
+        start = time.perf_counter()
+        work()
+        return replace(self, seconds={**self.seconds, stage: time.perf_counter() - start})
 
     def as_json(self) -> dict[str, Any]:
         """The record as `report.json` holds it."""

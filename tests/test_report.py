@@ -196,7 +196,8 @@ class Terminal(io.StringIO):
 
 def test_a_plain_line_a_frame():
     stream = io.StringIO()
-    with progress(2, stream) as shown:
+    with progress(stream) as shown:
+        shown.begin(2)
         shown.say("the scene has no lights")
         shown.frame_done(record(7))
         shown.frame_done(record(8, warnings=("a", "b")))
@@ -211,7 +212,8 @@ def test_a_bar_on_a_terminal(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "200")
     stream = Terminal()
-    with progress(2, stream) as shown:
+    with progress(stream) as shown:
+        shown.begin(2)
         shown.say("see [red] facets")
         shown.frame_done(record(7))
         shown.frame_done(record(8))
@@ -222,7 +224,8 @@ def test_a_bar_on_a_terminal(monkeypatch):
 
 
 def test_progress_goes_to_stderr(capsys):
-    with progress(1) as shown:
+    with progress() as shown:
+        shown.begin(1)
         shown.frame_done(record(1))
     out, err = capsys.readouterr()
     assert out == ""
@@ -230,5 +233,5 @@ def test_progress_goes_to_stderr(capsys):
 
 
 def test_an_error_inside_passes_through():
-    with pytest.raises(KeyError), progress(1, Terminal()):
+    with pytest.raises(KeyError), progress(Terminal()):
         raise KeyError

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, IntArray, dot, normalized, segments
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, normalized, segments
 
 _CHUNK = 1 << 20
 _NEAR_PLANE = 1e-6
@@ -96,12 +96,12 @@ def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> list
 
 def footprints(polygons: FloatArray, frame: FloatArray) -> Footprints:
     """Rectangles of the polygons (N, n, 3) that may be seen through a face."""
-    x, y, w = (dot(polygons, axis) for axis in frame)
+    x, y, w = dot(polygons, frame[0]), dot(polygons, frame[1]), dot(polygons, frame[2])
     beside = (x > w).all(axis=1) | (-x > w).all(axis=1) | (y > w).all(axis=1) | (-y > w).all(axis=1)
-    index = np.flatnonzero(np.any(w > 0, axis=1) & ~beside)
+    index = np.flatnonzero((w > 0).any(axis=1) & ~beside)
     x, y, w = x[index], y[index], w[index]
     reach = np.abs(x) + np.abs(y) + np.abs(w)
-    front = (w > _NEAR_PLANE * reach).all(axis=1)
+    front: BoolArray = np.all(w > _NEAR_PLANE * reach, axis=1)
     safe = np.where(front[:, None], w, 1.0)
     low = np.stack(((x / safe).min(axis=1), (y / safe).min(axis=1)), axis=1)
     high = np.stack(((x / safe).max(axis=1), (y / safe).max(axis=1)), axis=1)
