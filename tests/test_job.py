@@ -156,7 +156,7 @@ output: {directory: "1e3", facets: false, compression: zstd}
 PATHS = {
     "csv": "    csv: {file: track.csv, fill: true, look_at: [0, 0, 1e-5], units: mm}\n",
     "orbit": "    orbit: {center: [0, 1, 0], radius: 2, elevation_deg: 10, frames_per_turn: -100.5}\n",
-    "hold": "    keyframes: [{frame: -3, position: [0, 0, 0], look: [0, 0, -1]}]\n    interpolation: smooth\n",
+    "hold": "    keyframes: [{frame: -3, position: [0, 0, 0], look: [0, 0, 1]}]\n    interpolation: hold\n",
 }
 
 
