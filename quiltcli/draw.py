@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,9 +22,9 @@ from quiltcli.channels import CHANNELS, empty_buffers, exr_channels, fill
 from quiltcli.display import Facets, lit_facets, load_display
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, OwnerArray, cross, dot
 from quiltcli.homography import quilt_rays
-from quiltcli.job import JobFile, PackSpec, UvLayoutSpec, load_display_file, load_scene_file
-from quiltcli.layout import Layout, align, layout_from_uv, pixel_owners, read_layout
-from quiltcli.packing import pack
+from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
+from quiltcli.layout import Layout, pixel_owners
+from quiltcli.packing import layout_for
 from quiltcli.raster import (
     Blocks,
     Frame,
@@ -75,7 +74,7 @@ def set_stage(job: JobFile) -> Stage:
     Raises:
         QuiltError: a file is wrong, or the layout does not belong to the display.
     """
-    facets, layout = load_facets(job)
+    facets, layout = layout_for(job.layout or PackSpec(), load_display(load_display_file(job.display)))
     bleed = job.render.bleed
     owners = pixel_owners(layout, bleed)
     return Stage(
@@ -88,19 +87,6 @@ def set_stage(job: JobFile) -> Stage:
         owners=owners,
         fill=np.count_nonzero(owners > 0) / owners.size,
     )
-
-
-def load_facets(job: JobFile) -> tuple[Facets, Layout]:
-    """The display of a job and its layout: read, taken from texture coordinates, or packed."""
-    facets = load_display(load_display_file(job.display))
-    choice = job.layout or PackSpec()
-    if isinstance(choice, Path):
-        layout = read_layout(choice)
-    elif isinstance(choice, UvLayoutSpec):
-        layout = layout_from_uv(facets, choice.size)
-    else:
-        layout = pack(facets, choice.method, choice.size, choice.padding, choice.max_pages)
-    return align(layout, facets)
 
 
 class Clock:

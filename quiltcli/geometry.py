@@ -76,10 +76,21 @@ def transform(
     return matrix
 
 
-def transform_points(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    """Apply an affine (4, 4) `matrix` to points (..., 3)."""
-    result: FloatArray = points @ matrix[:3, :3].T + matrix[:3, 3]
-    return result
+def facet_from_world(origin: FloatArray, du: FloatArray, dv: FloatArray) -> FloatArray:
+    """Projective maps (F, 3, 4) from world metres to facet pixels, dropping points onto the plane.
+
+    The steps `du` and `dv` (F, 3) need not be perpendicular: point − origin = i·du + j·dv + something
+    normal to both, so (i, j) solve the 2×2 normal equations.
+    """
+    uu, uv, vv = dot(du, du), dot(du, dv), dot(dv, dv)
+    det = (uu * vv - uv * uv)[:, None]
+    maps = np.zeros((len(origin), 3, 4))
+    maps[:, 0, :3] = (vv[:, None] * du - uv[:, None] * dv) / det
+    maps[:, 1, :3] = (uu[:, None] * dv - uv[:, None] * du) / det
+    maps[:, 0, 3] = -dot(maps[:, 0, :3], origin)
+    maps[:, 1, 3] = -dot(maps[:, 1, :3], origin)
+    maps[:, 2, 3] = 1
+    return maps
 
 
 def segments(start: IntArray) -> tuple[IntArray, IntArray]:

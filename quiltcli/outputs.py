@@ -22,11 +22,10 @@ from quiltcli.exr import (
     read_exr,
     write_exr,
 )
-from quiltcli.geometry import IntArray
+from quiltcli.geometry import IntArray, facet_from_world
 from quiltcli.job import dump_job
 from quiltcli.layout import write_layout
 from quiltcli.unmap import facet_image, page_of
-from quiltcli.unmapfiles import facet_from_world
 from quiltcli.viewer import Viewer
 from quiltcli.wholefile import make_folder, write_text
 
@@ -98,7 +97,7 @@ def write_frame(stage: Stage, out: Outputs, viewer: Viewer, buffers: Buffers, th
             pages = range(len(stage.layout.pages))
             written += [pool.submit(_write_page, stage, out, page, buffers, attributes) for page in pages]
         if stage.job.output.facets:
-            maps = facet_from_world(stage.layout)
+            maps = facet_from_world(stage.layout.origin, stage.layout.du, stage.layout.dv)
             written += [
                 pool.submit(
                     _write_facet,

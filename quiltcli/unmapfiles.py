@@ -21,7 +21,7 @@ from quiltcli.exr import (
     read_header,
     write_exr,
 )
-from quiltcli.geometry import FloatArray, dot
+from quiltcli.geometry import facet_from_world
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.unmap import BACKGROUND, Channel, cut_facet, page_of
 from quiltcli.wholefile import make_folder
@@ -66,7 +66,7 @@ def unmap(
     if not overwrite:
         raise_all(OutputError, _in_the_way(files, layout, out))
     owners = pixel_owners(layout)
-    maps = facet_from_world(layout)
+    maps = facet_from_world(layout.origin, layout.du, layout.dv)
     make_folder(facet_path(out, 1, 1).parent)
     written = []
     for file in files:
@@ -81,22 +81,6 @@ def unmap(
             write_exr(path, cut, shared | facet_attributes(facet, maps[row]), image.compression)
             written.append(path)
     return written
-
-
-def facet_from_world(layout: Layout) -> FloatArray:
-    """Maps (F, 3, 4) from world metres to facet pixels, of points dropped squarely onto the raster's plane.
-
-    With X − origin = i·du + j·dv + something normal to both, (i, j) solve the 2×2 normal equations.
-    """
-    du, dv = layout.du, layout.dv
-    uu, uv, vv = dot(du, du), dot(du, dv), dot(dv, dv)
-    det = (uu * vv - uv * uv)[:, None]
-    maps = np.zeros((layout.facet.size, 3, 4))
-    maps[:, 0, :3] = (vv[:, None] * du - uv[:, None] * dv) / det
-    maps[:, 1, :3] = (uu[:, None] * dv - uv[:, None] * du) / det
-    maps[:, :2, 3] = -(maps[:, :2, :3] @ layout.origin[:, :, None])[:, :, 0]
-    maps[:, 2, 3] = 1
-    return maps
 
 
 def _inspected(quilts: Sequence[Path], layout: Layout) -> list[QuiltFile]:

@@ -15,7 +15,6 @@ from quiltcli.display import (
     build_facets,
     convex_parts,
     corner_pixels,
-    facet_from_world,
     lit_facets,
     load_display,
     pitch_mm,
@@ -23,7 +22,7 @@ from quiltcli.display import (
     triangulate,
 )
 from quiltcli.display.polygon import area_vectors
-from quiltcli.geometry import FloatArray, cross, dot, normalized, rotation_deg
+from quiltcli.geometry import FloatArray, cross, dot, facet_from_world, normalized, rotation_deg
 from quiltcli.job import DisplayFile, load_display_file
 from quiltcli.meshfile import PolygonMesh
 
@@ -215,7 +214,7 @@ def test_lit_facets() -> None:
 def test_facet_from_world_inverts_the_raster() -> None:
     facets = facet(PANEL @ rotation_deg((20, 30, 40)).T)
     point = facets.origin[0] + 12.5 * facets.du[0] + 7.25 * facets.dv[0] + 3 * facets.normal[0]
-    np.testing.assert_allclose(facet_from_world(facets)[0] @ [*point, 1], [12.5, 7.25, 1], atol=1e-9)
+    np.testing.assert_allclose(facet_from_world(facets.origin, facets.du, facets.dv)[0] @ [*point, 1], [12.5, 7.25, 1], atol=1e-9)
 
 
 @st.composite

@@ -77,9 +77,8 @@ def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> list
     targets = footprints(cones, frame)
     if not targets.index.size:
         return []
-    movers = footprints(polygons, frame)
-    side = int(np.clip(2.0 * np.sqrt(targets.index.size), 8, 128))
-    grid = _Grid(targets, side)
+    grid = _Grid(targets)
+    movers = grid.within(footprints(polygons, frame))
     result = []
     cells = grid.cells(movers)
     work = np.cumsum((cells[:, 2] - cells[:, 0] + 1) * (cells[:, 3] - cells[:, 1] + 1))
@@ -111,21 +110,30 @@ def footprints(polygons: FloatArray, frame: FloatArray) -> Footprints:
 
 
 class _Grid:
-    """Cells over one face, each with the target rectangles that touch it."""
+    """Cells over the part of a face that has targets, each with the target rectangles that touch it."""
 
-    def __init__(self, targets: Footprints, side: int) -> None:
+    def __init__(self, targets: Footprints) -> None:
         self.targets = targets
-        self.side = side
+        self.side = int(np.clip(2.0 * np.sqrt(targets.index.size), 8, 256))
+        self.low = targets.low.min(axis=0)
+        self.high = targets.high.max(axis=0)
+        side = self.side
         self.box = self.cells(targets)
         owner, cell = self._enumerate(self.box)
         order = np.argsort(cell, kind="stable")
         self.members = owner[order]
         self.start = np.searchsorted(cell[order], np.arange(side * side + 1))
 
+    def within(self, prints: Footprints) -> Footprints:
+        """The rectangles that meet the part of the face that has targets."""
+        inside = (prints.low <= self.high) & (prints.high >= self.low)
+        return prints.take(np.flatnonzero(inside.all(axis=1)))
+
     def cells(self, prints: Footprints) -> IntArray:
         """First column and row, last column and row (N, 4) of the cells the rectangles touch."""
-        low = np.floor((prints.low + 1.0) * (0.5 * self.side))
-        high = np.floor((prints.high + 1.0) * (0.5 * self.side))
+        scale = self.side / np.maximum(self.high - self.low, np.finfo(np.float64).tiny)
+        low = np.floor((prints.low - self.low) * scale)
+        high = np.floor((prints.high - self.low) * scale)
         cells: IntArray = np.clip(np.concatenate((low, high), axis=1), 0, self.side - 1).astype(np.int64)
         return cells
 

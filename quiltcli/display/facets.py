@@ -9,7 +9,7 @@ import numpy as np
 
 from quiltcli.display.edges import SharedEdges, find_shared_edges
 from quiltcli.display.polygon import convex, ear_clip, plane_coordinates
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, facet_from_world, segments
 
 
 @dataclass(frozen=True)
@@ -86,23 +86,13 @@ def lit_facets(facets: Facets, eye: FloatArray) -> BoolArray:
     return result
 
 
-def facet_from_world(facets: Facets) -> FloatArray:
-    """Projective maps (F, 3, 4) from world metres to facet pixels, dropping points onto the plane."""
-    result = np.zeros((facets.count, 3, 4))
-    for row, step in enumerate((facets.du, facets.dv)):
-        direction = step / dot(step, step)[:, None]
-        result[:, row, :3] = direction
-        result[:, row, 3] = -dot(direction, facets.origin)
-    result[:, 2, 3] = 1
-    return result
-
-
 def corner_pixels(facets: Facets) -> FloatArray:
     """Facet pixel coordinates (C, 2) of all corners."""
     row, _ = segments(facets.corner_start)
+    # Measured from the raster's own corner, so that no digits go into the display's place in the world.
+    maps = facet_from_world(np.zeros_like(facets.origin), facets.du, facets.dv)[row]
     local = facets.corners - facets.origin[row]
-    steps = (facets.du, facets.dv)
-    return np.stack([dot(local, step[row]) / dot(step, step)[row] for step in steps], axis=1)
+    return np.stack((dot(local, maps[:, 0, :3]), dot(local, maps[:, 1, :3])), axis=1)
 
 
 def triangulate(facets: Facets) -> tuple[Int32Array, Int32Array]:
