@@ -10,13 +10,15 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "quiltcli"
 ORDER = (
-    *("errors", "wholefile", "geometry", "yamlfast", "yamlsyntax", "yamlfile", "frames", "job"),
+    *("errors", "wholefile", "geometry", "yamlsyntax", "yamlfast", "yamlfile", "frames", "job"),
     *("meshfile", "display", "layout", "packing", "viewercsv", "viewerpath", "viewer", "eyes", "scene"),
     *("binning", "homography", "raster", "shading", "channels"),
     *("unmap", "exrcheck", "exr", "unmapfiles", "report", "progress", "diff"),
     *("draw", "outputs", "interrupt", "render"),
     *("verify", "preview", "simulate", "info", "checking", "farm", "cli", "__main__"),
 )
+# The fast reader is built on the slow one's resolver, and taken by it where libyaml is there.
+OPTIONAL = {("quiltcli.yamlsyntax", "quiltcli.yamlfast")}
 LIGHT = {"quiltcli.errors", "quiltcli"}
 
 
@@ -78,8 +80,8 @@ def test_a_module_imports_only_modules_before_it(path: Path) -> None:
     if module == "quiltcli":
         assert own(imports(path)) == set()
         return
-    later = {name for name in own(imports(path)) if place(name) > place(module)}
-    assert later == set()
+    later = {(module, name) for name in own(imports(path)) if place(name) > place(module)}
+    assert later - OPTIONAL == set()
 
 
 def test_files_of_a_folder_import_one_another_in_no_circle() -> None:
