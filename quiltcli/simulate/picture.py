@@ -1,0 +1,117 @@
+"""What a picture's camera sees: of the display with its images on, or of the scene itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from quiltcli.binning import facet_parts
+from quiltcli.display import Facets, lit_facets, triangulate
+from quiltcli.draw import Stage, draw_frame, new_buffers
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, dot, normalized
+from quiltcli.homography import eye_from_quilt
+from quiltcli.job import JobFile
+from quiltcli.layout import Layout, pixel_owners
+from quiltcli.raster import cut_blocks
+from quiltcli.scene import Lights, Materials, Scene
+from quiltcli.simulate.lookup import Shown, look_up, quilt_places
+from quiltcli.viewer import Viewer
+
+Camera: TypeAlias = tuple[Facets, Layout]
+"""A display of one facet, as `camera_display` makes it."""
+
+_SURROUND = np.array([0.05, 0.052, 0.056], dtype=np.float32)
+_DARK = 0.035  # a screen that is off, turned to the camera
+
+
+def with_channels(job: JobFile, channels: tuple[str, ...]) -> JobFile:
+    """The job with other channels."""
+    return job.model_copy(update={"output": job.output.model_copy(update={"channels": channels})})
+
+
+def visible_facets(stage: Stage, camera: Viewer, through: Camera, threads: int) -> Int32Array:
+    """The facet (P,) that every ray of the picture meets first, from either side; −1 for none."""
+    triangles, facet = triangulate(stage.facets)
+    scene = mesh_scene(stage.facets.corners, triangles)
+    # Everything from a micrometre on: the viewer's near and far are for the scene, not for the display.
+    here = replace(camera, near=1e-6, far=1e6, depth="radial")
+    job = with_channels(stage.job, ("triangle",))
+    render = job.render.model_copy(update={"samples": 1, "backface_culling": False})
+    display = camera_stage(job.model_copy(update={"render": render}), through, scene)
+    buffers = new_buffers(display)
+    draw_frame(display, here, buffers, threads)
+    result: Int32Array = np.concatenate(([-1], facet)).astype(np.int32)[buffers["triangle"]]
+    return result
+
+
+def camera_stage(job: JobFile, through: Camera, scene: Scene) -> Stage:
+    """The stage of a picture: a scene behind the camera's one facet."""
+    facets, layout = through
+    owners = pixel_owners(layout)
+    return Stage(
+        job, facets, layout, scene, facet_parts(facets, layout, 0), cut_blocks(layout, 0), owners, 1.0
+    )
+
+
+def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:
+    """A scene of bare triangles: what they look like is not asked."""
+    nothing = np.zeros((0, 3), dtype=np.float32)
+    return Scene(
+        vertices=vertices,
+        triangles=triangles,
+        normals=np.zeros(vertices.shape, dtype=np.float32),
+        colors=np.ones(vertices.shape, dtype=np.float32),
+        flat=np.ones(len(triangles), dtype=np.bool_),
+        object=np.zeros(len(triangles), dtype=np.int32),
+        material=np.zeros(len(triangles), dtype=np.int32),
+        objects=("display",),
+        materials=Materials(
+            np.ones((1, 3), np.float32),
+            np.zeros(1, np.float32),
+            np.ones(1, np.float32),
+            np.zeros((1, 3), np.float32),
+            np.ones(1, dtype=np.bool_),
+        ),
+        lights=Lights(nothing, nothing, nothing, nothing, np.zeros(3, np.float32), headlight=False),
+        background=np.zeros(3, dtype=np.float32),
+        notices=(),
+    )
+
+
+def displayed_light(
+    shown: Shown, camera: Viewer, through: Camera, facet: Int32Array, how: str
+) -> tuple[Float32Array, BoolArray]:
+    """What the camera sees of the display: (3, P) linear light, and (P,) where it is an image.
+
+    Back sides, and facets that are dark for this viewer, are grey, the darker the more they turn away.
+    """
+    light = np.repeat(_SURROUND[:, None], facet.size, axis=1)
+    facing = lit_facets(shown.facets, camera.eye) & shown.lit
+    met = np.flatnonzero(facet >= 0)
+    rays = picture_rays(camera, through, met)
+    grey = np.abs(dot(shown.facets.normal[facet[met]], normalized(rays.T)))
+    light[:, met] = (_DARK * (0.25 + 0.75 * grey)).astype(np.float32)
+    bright = facing[facet[met]]
+    place = quilt_places(shown, facet[met[bright]], rays[:, bright], camera.eye, facing)
+    light[:, met[bright]] = look_up(shown, facet[met[bright]], place, how)
+    lit = np.zeros(facet.size, dtype=np.bool_)
+    lit[met[bright]] = True
+    return light, lit
+
+
+def picture_rays(camera: Viewer, through: Camera, pixel: IntArray) -> FloatArray:
+    """Directions (3, P) from the camera through the centres of picture pixels with these addresses."""
+    matrix = eye_from_quilt(*through, camera.eye)[0]
+    row, column = np.divmod(pixel, through[1].pages[0, 0])
+    result: FloatArray = matrix[:, :1] * (column + 0.5) + matrix[:, 1:2] * (row + 0.5) + matrix[:, 2:]
+    return result
+
+
+def direct_light(stage: Stage, viewer: Viewer, through: Camera, threads: int) -> Float32Array:
+    """The scene without a display (3, P), through the same camera and by the same renderer."""
+    direct = camera_stage(stage.job, through, stage.scene)
+    buffers = new_buffers(direct)
+    draw_frame(direct, viewer, buffers, threads)
+    return np.stack([buffers[name].astype(np.float32) for name in "RGB"])
