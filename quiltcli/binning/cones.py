@@ -153,10 +153,11 @@ def _padded(polygons: list[FloatArray]) -> FloatArray:
 def overlapping(
     triangle: FloatArray, planes: FloatArray, wide: FloatArray, first: IntArray, second: IntArray
 ) -> BoolArray:
-    """Which pairs of convex cones have directions in common; exact but for touching, which counts.
+    """Which pairs of convex cones have directions in common; touching counts.
 
-    Two convex cones are apart exactly when a plane through the eye and an edge of one of them
-    separates them.
+    A plane through the eye and an edge of one of the cones that has the other on its outer side
+    proves them apart. For cones that lie in one half-space, as the broad phase proposes them, two that
+    are apart always have such a plane; beyond that a pair may be kept without need, never lost.
 
     Args:
         triangle: (T, n, 3) polygons minus the eye.

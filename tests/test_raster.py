@@ -1,0 +1,261 @@
+"""Rasterization: closed forms, watertight meshes, exact depth, ties, and the limits of depth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rig import cube, display, icosphere, panel, picture, pixel_rays, viewer
+
+from quiltcli.geometry import dot
+from quiltcli.raster import blocks as raster_blocks
+from quiltcli.raster import large, small
+from quiltcli.raster.blocks import new_canvas, ray_matrices
+from quiltcli.raster.depth import DepthRange
+from quiltcli.raster.prewarp import block_matrices, make_planes
+from quiltcli.raster.visibility import read_canvas
+
+FRONT = viewer((0, 0, 2))
+# One panel of 64 × 64 pixels, whose pixel (i, j) is the point (i/32 − 1, 1 − j/32, 0).
+PIXELS = 64
+
+
+def on_panel(points):
+    """World points of the panel's pixel coordinates."""
+    points = np.asarray(points, np.float64)
+    return np.column_stack((points[:, 0] / 32 - 1, 1 - points[:, 1] / 32, np.zeros(len(points))))
+
+
+def drawn(points, triangles, **keys):
+    """Which triangle each of the panel's own pixels shows, −1 for none."""
+    shown = picture(panel(), on_panel(points), triangles, FRONT, bleed=0, **keys)
+    return shown.page(shown.triangle)[:PIXELS, :PIXELS]
+
+
+def test_a_rectangle_of_two_triangles_covers_its_pixels_once():
+    covered = drawn([(3, 5), (43, 5), (43, 25), (3, 25)], [(0, 1, 2), (0, 2, 3)])
+    expected = np.zeros((64, 64), bool)
+    expected[5:25, 3:43] = True
+    np.testing.assert_array_equal(covered >= 0, expected)
+
+
+def test_the_diagonal_belongs_to_one_side_of_it():
+    covered = drawn([(0, 0), (64, 0), (0, 64)], [(0, 1, 2)])
+    below = np.add.outer(np.arange(64), np.arange(64))  # pixel centres lie on x + y = 64 where this is 63
+    assert (covered[below < 63] == 0).all()
+    assert (covered[below > 63] == -1).all()
+
+
+def split_grid(rng, cells, jitter):
+    """A square of pixels cut into jittered triangles, its border in place."""
+    at = np.linspace(4, 60, cells + 1)
+    x, y = np.meshgrid(at, at)
+    inner = np.zeros_like(x)
+    inner[1:-1, 1:-1] = jitter * (56 / cells)
+    points = np.stack((x + inner * rng.uniform(-1, 1, x.shape), y + inner * rng.uniform(-1, 1, x.shape)), -1)
+    index = np.arange((cells + 1) ** 2).reshape(cells + 1, -1)
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
+    triangles = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    return points.reshape(-1, 2), triangles
+
+
+@pytest.mark.parametrize("cells", [1, 2, 5, 14, 56, 80])
+@pytest.mark.parametrize("lattice", [False, True])
+def test_a_mesh_covers_every_pixel_exactly_once(cells, lattice):
+    rng = np.random.default_rng(cells)
+    points, triangles = split_grid(rng, cells, 0.35 if cells < 9 or not lattice else 0.0)
+    if lattice:  # vertices, and with them edges, exactly on pixel centres; too small cells would fold over
+        inner = (points > 4) & (points < 60)
+        points[inner] = np.floor(points[inner]) + 0.5
+    whole = drawn(points, triangles) >= 0
+    assert whole[4:60, 4:60].all()
+    assert not whole[:4].any()
+    for _ in range(3):  # a pixel that two triangles claim shows when they are drawn apart
+        some = rng.random(len(triangles)) < 0.5
+        one, other = (drawn(points, triangles[pick]) >= 0 for pick in (some, ~some))
+        assert not (one & other).any()
+        np.testing.assert_array_equal(one | other, whole)
+
+
+def test_slivers_close_the_gap_between_their_neighbours():
+    fan = [(4.5 + k * 1e-7, 4) for k in range(8)] + [(60, 4), (30, 60), (4, 60), (4, 4)]
+    triangles = [(k, k + 1, 9) for k in range(8)] + [(9, 10, 11), (9, 11, 0)]
+    covered = drawn(fan, triangles) >= 0
+    clean = drawn([(4, 4), (60, 4), (30, 60), (4, 60)], [(0, 1, 2), (0, 2, 3)]) >= 0
+    np.testing.assert_array_equal(covered, clean)
+
+
+def sphere_shells():
+    vertices, triangles = icosphere(3)
+    front = (
+        dot(np.cross(*np.diff(vertices[triangles], axis=1).transpose(1, 0, 2)), vertices[triangles[:, 0]]) > 0
+    )
+    assert front.all()
+    return vertices * 0.8, triangles
+
+
+@pytest.mark.parametrize("eye", [(2.2, 1.8, 3.2), (1.05, 0.2, 0.3), (0.3, 4, 0.1)])
+def test_front_and_back_of_a_closed_mesh_cover_the_same_pixels(eye):
+    vertices, triangles = sphere_shells()
+    seen_by = viewer(eye)
+    local = vertices - seen_by.eye
+    a, b, c = (local[triangles[:, k]] for k in range(3))
+    facing = dot(a, np.cross(b, c)) < 0
+    one, other = (picture(cube(), vertices, triangles[pick], seen_by) for pick in (facing, ~facing))
+    assert (one.triangle >= 0).any()
+    np.testing.assert_array_equal(one.triangle >= 0, other.triangle >= 0)
+
+
+def test_depth_is_that_of_the_plane_behind_the_pixel():
+    rng = np.random.default_rng(3)
+    vertices = rng.uniform(-1, 1, (300, 3))
+    triangles = rng.integers(0, 300, (100, 3))
+    triangles = triangles[(np.diff(np.sort(triangles)) > 0).all(axis=1)]
+    shown = picture(cube(), vertices, triangles, viewer((2.2, 1.8, 3.2)))
+    seen = np.flatnonzero(shown.triangle >= 0)
+    ray = pixel_rays(shown, seen)
+    a, b, c = (vertices[triangles[shown.triangle[seen], k]] - shown.frame.viewer.eye for k in range(3))
+    normal = np.cross(b - a, c - a)
+    exact = dot(normal, a) / dot(normal, ray) * (ray @ shown.frame.viewer.look)
+    steep = np.abs(dot(normal, ray)) < 1e-3 * np.sqrt(dot(normal, normal) * dot(ray, ray))
+    assert seen.size > 5000
+    np.testing.assert_allclose(shown.depth[seen][~steep], exact[~steep], rtol=2e-7)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_of_equal_depths_the_lower_triangle_is_seen(order):
+    points = [(4, 4), (60, 8), (20, 60)]
+    triangles = np.array([(0, 1, 2), (1, 2, 0)])[list(order)]
+    covered = drawn(points, triangles)
+    assert set(np.unique(covered)) == {-1, 0}
+
+
+def test_nearer_triangles_hide_farther_ones_in_any_order():
+    square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float64)
+    vertices = np.concatenate([square * 0.5 + (0, 0, z) for z in (-2, 0.5, -1, 0.2)])
+    triangles = np.concatenate([np.array([(0, 1, 2), (0, 2, 3)]) + 4 * k for k in range(4)])
+    shown = picture(panel(), vertices, triangles, FRONT)
+    assert set(np.unique(shown.triangle)) == {-1, 2, 3}
+    np.testing.assert_allclose(shown.depth[shown.triangle >= 0], 1.5, rtol=1e-12)
+
+
+WIDE = 9.013, 30.07  # no ray through a pixel's centre ends exactly on the floor's edge
+
+
+def floor_and_back():
+    """A floor that runs through below the eye, from far ahead to far behind it."""
+    x, z = WIDE
+    return np.array([(-x, -1, -z), (x, -1, -z), (x, -1, z), (-x, -1, z)]), [(0, 1, 2), (0, 2, 3)]
+
+
+@pytest.mark.parametrize("depth", ["planar", "radial"])
+def test_a_triangle_beside_and_behind_the_eye_needs_no_clipping(depth):
+    vertices, triangles = floor_and_back()
+    facets = cube(viewing_side="back")  # seen from inside, all around
+    shown = picture(facets, vertices, triangles, viewer((0, 0, 0), (0, 0, -1), 0.01, 1000, depth))
+    ray = pixel_rays(shown, np.flatnonzero(shown.mine))
+    at = -1 / np.where(ray[:, 1] < 0, ray[:, 1], np.nan)
+    hit = (np.abs(at * ray[:, 0]) < WIDE[0]) & (np.abs(at * ray[:, 2]) < WIDE[1])
+    length = -at * ray[:, 2] if depth == "planar" else at * np.linalg.norm(ray, axis=1)
+    hit &= length >= 0.01
+    np.testing.assert_array_equal(shown.triangle[shown.mine] >= 0, hit)
+    np.testing.assert_allclose(shown.depth[shown.mine][hit], length[hit], rtol=1e-6)
+
+
+@pytest.mark.parametrize("depth", ["planar", "radial"])
+def test_near_and_far_cut_through_triangles(depth):
+    vertices, triangles = floor_and_back()
+    near, far = 1.5, 4.0
+    shown = picture(panel(density=64), vertices, triangles, viewer((0, 0, 1), (0, 0, 0), near, far, depth))
+    everything = picture(
+        panel(density=64), vertices, triangles, viewer((0, 0, 1), (0, 0, 0), 0.001, 1e6, depth)
+    )
+    inside = (everything.depth >= near) & (everything.depth <= far)
+    assert 100 < inside.sum() < (everything.triangle >= 0).sum()
+    np.testing.assert_array_equal(shown.triangle >= 0, inside)
+    np.testing.assert_array_equal(shown.depth[inside], everything.depth[inside])
+
+
+def test_what_lies_before_near_does_not_hide_what_lies_behind():
+    square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float64)
+    vertices = np.concatenate((square + (0, 0, 1.95), square * 3 + (0, 0, -1)))
+    triangles = [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)]
+    shown = picture(panel(), vertices, triangles, viewer((0, 0, 2), near=0.5))
+    np.testing.assert_allclose(shown.depth[shown.mine], 3, rtol=1e-12)
+
+
+def random_scene(seed):
+    rng = np.random.default_rng(seed)
+    centre = rng.uniform(-1, 1, (250, 1, 3))
+    size = 10 ** rng.uniform(-3, 0, (250, 1, 1))
+    vertices = (centre + size * rng.uniform(-1, 1, (250, 3, 3))).reshape(-1, 3)
+    return vertices, np.arange(750).reshape(-1, 3)
+
+
+def test_small_and_large_paths_see_the_same():
+    vertices, triangles = random_scene(5)
+    frame = picture(cube(), vertices, triangles, viewer((2.2, 1.8, 3.2))).frame
+    block = np.flatnonzero(np.diff(frame.pairs.start))
+    matrices = block_matrices(frame.rays, frame.blocks, block, (0.0, 0.0))
+    rays = ray_matrices(frame.rays.eye_from_quilt, frame.blocks, block, (0.0, 0.0))
+    limits = DepthRange(0.05, 100, False, frame.viewer.look, rays)
+    (planes,) = make_planes(frame.sight, frame.pairs, frame.blocks, block, matrices)
+    extent = np.maximum(planes.box[1] - planes.box[0], planes.box[3] - planes.box[2])
+    planes = planes.take(np.flatnonzero(extent < small.LIMIT))
+    seen = []
+    for draw in (small.draw_small, large.draw_large):
+        canvas = new_canvas(block, frame.blocks)
+        draw(planes, canvas, limits, 22)
+        (hits,) = read_canvas(canvas, [planes], frame.blocks, rays, frame.owners, 22)
+        seen.append((hits.pixel, hits.triangle, hits.position))
+    assert len(seen[0][0]) > 300
+    for one, other in zip(*seen, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_blocks_do_not_show(monkeypatch):
+    vertices, triangles = random_scene(6)
+    seen_by = viewer((2.2, 1.8, 3.2))
+    whole = picture(cube(60), vertices, triangles, seen_by)
+    monkeypatch.setattr(raster_blocks, "SIDE", 64)
+    monkeypatch.setattr("quiltcli.raster.prewarp.SIDE", 64)
+    monkeypatch.setattr(raster_blocks, "BATCH_PIXELS", 5000)
+    pieces = picture(cube(60), vertices, triangles, seen_by)
+    assert len(pieces.frame.blocks.facet) > 2 * len(whole.frame.blocks.facet)
+    np.testing.assert_array_equal(pieces.triangle, whole.triangle)
+    # Planes of 1/t are rounded to 2⁻⁵⁰ of their greatest value in a block, over 512 pixels at most.
+    np.testing.assert_allclose(pieces.depth, whole.depth, rtol=2.0**-38)
+
+
+def test_bleed_continues_the_picture_past_the_edge():
+    wall = np.array([(-99, -99, -5), (99, -99, -5), (99, 99, -5), (-99, 99, -5.0)])
+    shown = picture(cube(), wall, [(0, 1, 2), (0, 2, 3)], viewer((2.2, 1.8, 3.2)), bleed=2)
+    bleed = np.flatnonzero(shown.mine & (shown.owners < 0))
+    ray = pixel_rays(shown, bleed)
+    assert bleed.size > 100
+    np.testing.assert_allclose(
+        shown.depth[bleed], -8.2 / ray[:, 2] * (ray @ shown.frame.viewer.look), rtol=1e-6
+    )
+    assert (shown.triangle[shown.owners == 0] == -1).all()
+
+
+def test_pixels_outside_a_facets_polygon_stay_empty():
+    triangle = display([(-1, -1, 0), (1, -1, 0), (0, 1, 0)], [[0, 1, 2]], 32)
+    wall = np.array([(-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1.0)])
+    shown = picture(triangle, wall, [(0, 1, 2), (0, 2, 3)], FRONT, bleed=0)
+    np.testing.assert_array_equal(shown.triangle >= 0, shown.owners == 1)
+
+
+def test_the_picture_does_not_depend_on_which_way_the_viewer_looks():
+    vertices, triangles = random_scene(7)
+    one = picture(cube(), vertices, triangles, viewer((2.2, 1.8, 3.2), depth="radial"))
+    other = picture(cube(), vertices, triangles, viewer((2.2, 1.8, 3.2), (0.4, -0.7, 0.1), depth="radial"))
+    np.testing.assert_array_equal(one.triangle, other.triangle)
+    np.testing.assert_array_equal(one.depth, other.depth)
+
+
+def test_samples_look_beside_the_centre():
+    points = [(10.25, 0), (20.25, 0), (20.25, 64), (10.25, 64)]
+    left = drawn(points, [(0, 1, 2), (0, 2, 3)], sample=(-0.4, 0.0))[32] >= 0
+    right = drawn(points, [(0, 1, 2), (0, 2, 3)], sample=(0.4, 0.0))[32] >= 0
+    assert np.flatnonzero(left).tolist() == list(range(11, 21))
+    assert np.flatnonzero(right).tolist() == list(range(10, 20))
