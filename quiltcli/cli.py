@@ -41,6 +41,19 @@ class Quilt(click.Group):
                 raise
             click.echo("error: not enough memory (smaller pages or fewer threads need less)", err=True)
             ctx.exit(1)
+        except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
+            raise
+        except Exception as error:
+            if ctx.params.get("debug"):
+                raise
+            click.echo(f"error: {_unexpected(error)}", err=True)
+            ctx.exit(1)
+
+
+def _unexpected(error: Exception) -> str:
+    """What is said of an error that is no user's fault, and that nobody thought of."""
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"quilt has met a fault of its own: {what} (quilt --debug COMMAND … shows where)"
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg] # generic only in some versions of click
@@ -84,6 +97,7 @@ def _size(text: str) -> tuple[int, int] | None:
 FRAMES = Parsed("frames", _frames)
 FACETS = Parsed("facets", _facets)
 SIZE = Parsed("size", _size)
+ROWS = 20  # of a table, before --all
 
 
 @click.group(
@@ -131,25 +145,24 @@ def render(
     if resume and overwrite:
         raise click.UsageError("--resume keeps finished frames and --overwrite replaces them: give one")
     options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run)
-    loaded = load_job(job, sets)
-    if scheduler is not None:
-        from quiltcli.farm import render_on
-
-        render_on(scheduler, job, sets, loaded, options)
-        return
-    _render_here(loaded, options)
+    _render(load_job(job, sets), options, scheduler)
 
 
-def _render_here(job: Any, options: Any) -> None:
-    """Render on this machine, with progress on stderr and the summary on stdout."""
+def _render(job: Any, options: Any, scheduler: str | None) -> None:
+    """Render here or on a farm, with progress on stderr and the summary on stdout."""
+    from quiltcli.farm import render_on
     from quiltcli.interrupt import Stopped
     from quiltcli.progress import progress
-    from quiltcli.render import Listener, render
+    from quiltcli.render import Listener
+    from quiltcli.render import render as render_here
     from quiltcli.report import summary_warnings
+
+    def work(*given: Any) -> Any:
+        return render_here(*given) if scheduler is None else render_on(scheduler, *given)
 
     with progress() as shown:
         try:
-            records = render(job, options, Listener(shown.begin, shown.frame_done, shown.say))
+            records = work(job, options, Listener(shown.begin, shown.frame_done, shown.say))
         except Stopped as stopped:
             shown.say(str(stopped))
             sys.exit(stopped.exit_code)
@@ -228,6 +241,31 @@ def check(files: tuple[Path, ...]) -> None:
 
 
 @main.command()
+@click.argument("file", type=PATH)
+@click.option("--all", "every", is_flag=True, help=f"Every row of the table, not only the first {ROWS}.")
+@click.option("--json", "as_json", is_flag=True, help="Everything, for programs.")
+def info(file: Path, every: bool, as_json: bool) -> None:
+    """Say what FILE is: a display, layout, scene, job, mesh or EXR image."""
+    from quiltcli.info import describe
+
+    found = describe(file)
+    if as_json:
+        import json
+
+        click.echo(json.dumps(found.as_json(), indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    width = max(len(label) for label, _ in found.lines)
+    for label, text in (("", f"{found.kind} {file}"), *found.lines):
+        click.echo(f"{label:<{width}}  {text}" if label else text)
+    rows = found.rows if every else found.rows[:ROWS]
+    if rows:
+        click.echo()
+        _print_aligned(found.columns, rows)
+    if len(rows) < len(found.rows):
+        click.echo(f"and {len(found.rows) - len(rows):,} more (--all shows them)")
+
+
+@main.command()
 @click.argument("quilts", nargs=-1, required=True, type=PATH)
 @click.option("--layout", type=PATH, required=True, help="The layout the quilts were made for.")
 @click.option("-o", "--output", type=PATH, required=True, help="Folder for the facet images.")
@@ -273,11 +311,23 @@ def _print_rows(columns: Any, rows: Any) -> None:
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(*columns, box=SIMPLE, pad_edge=False)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(Text, row))  # brackets are brackets, not markup
     Console().print(table)
+
+
+def _print_aligned(columns: Any, rows: Any) -> None:
+    """A table for people to read: drawn on a terminal, aligned by spaces elsewhere."""
+    if sys.stdout.isatty():
+        _print_rows(columns, rows)
+        return
+    table = [tuple(columns), *map(tuple, rows)]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for row in table:
+        click.echo("  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=True)).rstrip())
 
 
 def run() -> None:
