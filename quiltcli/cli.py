@@ -94,9 +94,21 @@ def _size(text: str) -> tuple[int, int] | None:
     return int(width), int(height)
 
 
+def _point(text: str) -> tuple[float, ...]:
+    try:
+        point = tuple(map(float, text.split(",")))
+    except ValueError:
+        point = ()
+    if len(point) != 3 or not all(abs(value) < float("inf") for value in point):
+        raise JobError(f"expected a point in metres, such as 0,1.6,2.5, got {text!r}")
+    return point
+
+
 FRAMES = Parsed("frames", _frames)
 FACETS = Parsed("facets", _facets)
 SIZE = Parsed("size", _size)
+POINT = Parsed("point", _point)
+VIEW = click.Choice(("aces", "srgb"))
 ROWS = 20  # of a table, before --all
 
 
@@ -266,6 +278,65 @@ def info(file: Path, every: bool, as_json: bool) -> None:
 
 
 @main.command()
+@click.argument("job", type=PATH)
+@click.option("-f", "--frames", type=FRAMES, help="Frames such as 7 or 1-12; the job's first by default.")
+@click.option(
+    "-o", "--output", type=PATH, required=True, help="PNG to write; #### in its name is the frame number."
+)
+@click.option("--size", type=SIZE, default="1200x900", show_default=True, help="Size of the picture.")
+@click.option("--from", "place", type=POINT, metavar="X,Y,Z", help="Look from here; from the eye by default.")
+@click.option("--look-at", type=POINT, metavar="X,Y,Z", help="Look there; at the display by default.")
+@click.option("--fov", type=click.FloatRange(0, 170, min_open=True), help="Degrees from top to bottom.")
+@click.option("--filter", type=click.Choice(("nearest", "linear")), default="linear", show_default=True)
+@click.option(
+    "--supersample", type=click.IntRange(1, 16), default=2, show_default=True, help="Rays across a pixel."
+)
+@click.option("--compare/--no-compare", default=True, help="From the eye, compare with a direct picture.")
+@click.option("--direct", type=PATH, help="Write the direct picture, as PNG.")
+@click.option("--heat-map", type=PATH, help="Write a picture of the errors, as PNG.")
+@click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")
+@click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
+@click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
+@click.option(
+    "--set", "sets", metavar="KEY=VALUE", multiple=True, help="Set a value of the job, by dotted path."
+)
+def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], **how: Any) -> None:
+    """Light the display of JOB with its images and look at it.
+
+    From the viewer's eye the picture is compared with a direct one of the scene; the figures go to
+    stdout. The images are those that a render has left; where there are none they are drawn in memory.
+    """
+    from quiltcli.job import load_job
+    from quiltcli.simulate import PictureOptions
+    from quiltcli.simulate.files import Pictures, write_pictures
+
+    pictures = Pictures(
+        how.pop("output"), how.pop("direct"), how.pop("heat_map"), how.pop("view"), how.pop("exposure")
+    )
+    if how["size"] is None:
+        raise click.UsageError("--size: a picture needs a width and a height")
+    options = PictureOptions(samples=how.pop("supersample"), threads=how.pop("threads") or 0, **how)
+    loaded = load_job(job, sets)
+    for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures):
+        click.echo(line)
+
+
+@main.command()
+@click.argument("images", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="PNG to write, or a folder for several.")
+@click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")
+@click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
+def preview(images: tuple[Path, ...], output: Path, view: str, exposure: float) -> None:
+    """Turn EXR IMAGES, quilts or facets, into PNGs to look at, at most 2048 pixels wide and high."""
+    from quiltcli.preview import preview as write_preview
+    from quiltcli.preview import preview_paths
+
+    for image, picture in preview_paths(images, output):
+        width, height = write_preview(image, picture, view, exposure)
+        click.echo(f"{picture}  {width}×{height}")
+
+
+@main.command()
 @click.argument("quilts", nargs=-1, required=True, type=PATH)
 @click.option("--layout", type=PATH, required=True, help="The layout the quilts were made for.")
 @click.option("-o", "--output", type=PATH, required=True, help="Folder for the facet images.")
@@ -300,6 +371,63 @@ def diff(a: Path, b: Path, **limits: Any) -> None:
     result = compare(a, b, Limits(**{name: value for name, value in limits.items() if value is not None}))
     _print_rows(COLUMNS, diff_rows(result))
     sys.exit(result.code)
+
+
+@main.command()
+@click.argument("job", type=PATH)
+@click.option("-f", "--frame", type=int, help="The frame; the job's first by default.")
+@click.option("-o", "--output", type=PATH, help="Folder of the images, instead of the job's.")
+@click.option("--redraw", is_flag=True, help="Draw the frame in memory even if its images exist.")
+@click.option("--all", "everything", is_flag=True, help="Look at every pixel, not a sample.")
+@click.option("--pixels", type=click.IntRange(min=1), help="Pixels to look at; 200000 by default.")
+@click.option("--json", "as_json", type=PATH, metavar="FILE", help="Write the result as JSON; - is stdout.")
+@click.option("--picture", type=PATH, help="Draw the pages with a mark at every fault, as .png.")
+@click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
+@click.option(
+    "--set", "sets", metavar="KEY=VALUE", multiple=True, help="Set a value of the job, by dotted path."
+)
+def verify(
+    job: Path,
+    frame: int | None,
+    output: Path | None,
+    redraw: bool,
+    everything: bool,
+    pixels: int | None,
+    as_json: Path | None,
+    picture: Path | None,
+    threads: int | None,
+    sets: tuple[str, ...],
+) -> None:
+    """Hold a frame of JOB against ray casts, pixel by pixel; exit 1 if a tolerance is missed."""
+    from quiltcli.job import load_job
+    from quiltcli.verify import SAMPLE, VerifyOptions
+    from quiltcli.verify import verify as verify_frame
+    from quiltcli.verify.picture import write_picture
+
+    options = VerifyOptions(frame, everything, pixels or SAMPLE, output, redraw, threads or 0)
+    verdict, stage, images = verify_frame(load_job(job, sets), options)
+    _print_verdict(verdict, as_json)
+    if picture is not None:
+        write_picture(picture, stage.layout, images, verdict.faults)
+    if not verdict.passed:
+        sys.exit(1)
+
+
+def _print_verdict(verdict: Any, as_json: Path | None) -> None:
+    """The verdict as a table on stdout, as JSON, or both."""
+    import json
+
+    from quiltcli.verify import COLUMNS, verdict_rows
+    from quiltcli.wholefile import write_text
+
+    text = json.dumps(verdict.as_json(), indent=2, allow_nan=False)
+    if as_json == Path("-"):
+        click.echo(text)
+        return
+    if as_json is not None:
+        write_text(as_json, text + "\n")
+    _print_aligned(COLUMNS, verdict_rows(verdict))
+    click.echo(f"frame {verdict.frame}, {verdict.images}: {verdict.words}")
 
 
 def _print_rows(columns: Any, rows: Any) -> None:

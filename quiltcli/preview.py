@@ -7,7 +7,7 @@ sRGB, which cuts what is brighter than white, is the alternative.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from quiltcli.errors import OutputError, Problem
 from quiltcli.exr import read_exr
 from quiltcli.geometry import Float32Array
-from quiltcli.wholefile import whole_file
+from quiltcli.wholefile import make_folder, whole_file
 
 Bytes: TypeAlias = NDArray[np.uint8]
 
@@ -100,6 +100,24 @@ def block_means(image: NDArray[Any], factor: int) -> Float32Array:
     wide = np.diff(columns, append=image.shape[1])[None, :, None]
     result: Float32Array = (sums / (tall * wide)).astype(np.float32)
     return result
+
+
+def preview_paths(images: Sequence[Path], output: Path) -> list[tuple[Path, Path]]:
+    """Every image with the PNG it becomes: the one named, or one of its own name in the folder `output`.
+
+    Raises:
+        OutputError: several images and one picture, or two images of one name.
+    """
+    if output.suffix.lower() == ".png":
+        if len(images) > 1:
+            wrong = f"is one picture for {len(images)} images, expected a folder"
+            raise OutputError(Problem(wrong, file=str(output)))
+        return [(images[0], output)]
+    pairs = [(image, output / f"{image.stem}.png") for image in images]
+    if len({picture for _, picture in pairs}) < len(pairs):
+        raise OutputError(Problem("two images of the same name would become one picture", file=str(output)))
+    make_folder(output)
+    return pairs
 
 
 def preview(image: Path, picture: Path, view: str = "aces", exposure: float = 0.0) -> tuple[int, int]:
