@@ -123,6 +123,8 @@ def _checked(job: JobFile, options: RenderOptions) -> tuple[Stage, Outputs, list
 def _connected(distributed: Any, address: str) -> Iterator[Any]:
     """A client of the scheduler, closed at the end."""
     try:
+        # Checked first: a client that fails on a malformed address is noisy when it is cleaned up.
+        distributed.comm.get_address_host_port(address)
         client = distributed.Client(address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
         what = str(error).splitlines()[0] if str(error) else type(error).__name__
@@ -148,7 +150,7 @@ def _collect(distributed: Any, client: Any, tasks: Sequence[Task], listener: Lis
     problems: list[Problem] = []
     with stop_between_frames() as request:
         try:
-            for future in distributed.as_completed(list(waiting)):
+            for future in distributed.as_completed(list(waiting), loop=client.loop):
                 frame = waiting.pop(future).frame
                 record = _result(future, frame, problems, listener.say)
                 future.release()
