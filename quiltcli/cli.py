@@ -292,6 +292,7 @@ def info(file: Path, every: bool, as_json: bool) -> None:
     "--supersample", type=click.IntRange(1, 16), default=2, show_default=True, help="Rays across a pixel."
 )
 @click.option("--compare/--no-compare", default=True, help="From the eye, compare with a direct picture.")
+@click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
 @click.option("--direct", type=PATH, help="Write the direct picture, as PNG.")
 @click.option("--heat-map", type=PATH, help="Write a picture of the errors, as PNG.")
 @click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")

@@ -22,7 +22,7 @@ from quiltcli.simulate.camera import aimed, camera_display, frame_display
 from quiltcli.simulate.compare import Comparison, compare, figures, heat_map, heat_scale, seam_pixels
 from quiltcli.simulate.images import shown_images
 from quiltcli.simulate.lookup import Shown
-from quiltcli.simulate.picture import direct_light, displayed_light, visible_facets, with_channels
+from quiltcli.simulate.picture import direct_light, displayed_light, outlined, visible_facets, with_channels
 from quiltcli.viewer import Viewer, check_viewer, viewer_at
 
 __all__ = [
@@ -49,6 +49,7 @@ class PictureOptions:
         filter: `nearest` shows the pixel that is met, `linear` goes between the four around.
         samples: rays a pixel, across and down.
         compare: hold the picture against a direct one of the scene; from the eye only.
+        edges: draw a line along the edges of the facets; what is compared is the picture without.
         threads: batches drawn at a time; 0 takes every core.
     """
 
@@ -59,6 +60,7 @@ class PictureOptions:
     filter: str = "linear"
     samples: int = 2
     compare: bool = True
+    edges: bool = False
     threads: int = 0
 
 
@@ -110,13 +112,15 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     threads = options.threads or default_threads()
     facet = visible_facets(stage, camera, through, threads)
     light, lit = displayed_light(shown, camera, through, facet, options.filter)
-    picture = block_means(_image(light, width), options.samples)
+    picture = plain = block_means(_image(light, width), options.samples)
+    if options.edges:
+        picture = block_means(_image(outlined(light, facet, width), width), options.samples)
     if options.place is not None or not options.compare:
         return Simulation(viewer.frame, picture, None, None, "")
     direct = block_means(_image(direct_light(stage, viewer, through, threads), width), options.samples)
     on_lit = np.where(lit, facet, -1).reshape(height, width).astype(np.int32)
     covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
-    comparison = compare(picture, direct, covered, seam_pixels(on_lit, options.samples))
+    comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples))
     return Simulation(viewer.frame, picture, direct, comparison, "")
 
 

@@ -24,6 +24,7 @@ Camera: TypeAlias = tuple[Facets, Layout]
 
 _SURROUND = np.array([0.05, 0.052, 0.056], dtype=np.float32)
 _DARK = 0.035  # a screen that is off, turned to the camera
+_LINE = np.float32(0.28)
 
 
 def with_channels(job: JobFile, channels: tuple[str, ...]) -> JobFile:
@@ -115,3 +116,19 @@ def direct_light(stage: Stage, viewer: Viewer, through: Camera, threads: int) ->
     buffers = new_buffers(direct)
     draw_frame(direct, viewer, buffers, threads)
     return np.stack([buffers[name].astype(np.float32) for name in "RGB"])
+
+
+def outlined(light: Float32Array, facet: Int32Array, width: int) -> Float32Array:
+    """The light (3, P) of a picture with a thin line along all edges of facets.
+
+    Args:
+        light: as of `displayed_light`.
+        facet: (P,) facet of every ray, −1 for none.
+        width: rays in a row.
+    """
+    rows = facet.reshape(-1, width)
+    edge = np.zeros(rows.shape, dtype=np.bool_)
+    edge[:, 1:] |= rows[:, 1:] != rows[:, :-1]
+    edge[1:] |= rows[1:] != rows[:-1]
+    edge[:, :-1] |= edge[:, 1:]
+    return np.where(edge.reshape(-1), np.float32(0.4) * light + np.float32(0.6) * _LINE, light)
