@@ -18,6 +18,7 @@ ORDER = (
         "exrcheck",
         "exr",
         "unmapfiles",
+        "pixelmaps",
         "glyphs",
         "pattern",
         "patternfiles",
