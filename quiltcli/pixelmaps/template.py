@@ -1,0 +1,104 @@
+"""Content templates: pages as pictures that artists and technicians lay under their work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from quiltcli.display import Facets
+from quiltcli.layout import Layout, pixel_owners
+from quiltcli.pattern import corner_letter, facet_color, roomiest
+from quiltcli.patternfiles import page_pattern, write_png
+from quiltcli.pixelmaps.naming import facet_label, page_files
+from quiltcli.pixelmaps.placing import placed_rows
+from quiltcli.wholefile import write_text
+
+
+def write_png_template(layout: Layout, facets: Facets | None, path: Path) -> list[Path]:
+    """Write one picture a page at its exact pixels: the test pattern `id`, transparent between facets."""
+    owners = pixel_owners(layout)
+    files = page_files(path, len(layout.pages))
+    for page, file in enumerate(files):
+        write_png(
+            file, page_pattern(layout, page, "id", owners, facets.names if facets else (), dtype=np.uint8)
+        )
+    return files
+
+
+def write_svg_template(layout: Layout, facets: Facets | None, path: Path) -> list[Path]:
+    """Write one drawing a page, a unit being a pixel; every facet is a group in its own pixels."""
+    files = page_files(path, len(layout.pages))
+    for page, file in enumerate(files):
+        write_text(file, svg_template(layout, facets, page))
+    return files
+
+
+def svg_template(layout: Layout, facets: Facets | None, page: int) -> str:
+    """The drawing of a page (0-based)."""
+    width, height = layout.pages[page]
+    names = facets.names if facets else ()
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}"'
+        f' viewBox="0 0 {width} {height}" font-family="monospace" text-anchor="middle">',
+    ]
+    for row in placed_rows(layout):
+        if layout.page[row] == page:
+            facet = int(layout.facet[row])
+            name = names[facet - 1] if facet <= len(names) else ""
+            lines += _facet(layout, row, facet_label(facet, names), name)
+    return "\n".join([*lines, "</svg>"]) + "\n"
+
+
+def _facet(layout: Layout, row: int, label: str, name: str) -> list[str]:
+    """A facet's group: polygon with a border one pixel wide inside it, id, name, arrow, corner letters."""
+    (a, c, e), (b, d, f) = layout.quilt_from_facet[row]
+    polygon = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    points = " ".join(f"{_short(x)},{_short(y)}" for x, y in polygon)
+    fill = "#" + "".join(f"{round(255 * part):02x}" for part in facet_color(int(layout.facet[row])))
+    matrix = " ".join(map(_short, (a, b, c, d, e, f)))
+    centre, radius = roomiest(polygon)
+    x, y = centre
+    half = radius * 0.7
+    lines = [
+        f'<g id="{escape(label)}" transform="matrix({matrix})">',
+        f'<clipPath id="{escape(label)}_clip"><polygon points="{points}"/></clipPath>',
+        # Half of a line lies outside: two pixels, clipped, are one inside.
+        f'<polygon points="{points}" fill="{fill}" stroke="#fff" stroke-width="2"'
+        f' clip-path="url(#{escape(label)}_clip)"/>',
+        _text(x, y + 0.35 * half, 0.9 * half, str(layout.facet[row]), "#fff"),
+    ]
+    if name:
+        size = min(0.5 * half, 3 * half / len(name))
+        lines.append(_text(x, y + 0.95 * half, size, name, "#ff0"))
+    lines += _flag(x, y, half)
+    for at, corner in enumerate(polygon):
+        size = min(0.4 * radius, 0.33 * float(np.hypot(*(centre - corner))))
+        here = corner + (centre - corner) * 0.25
+        lines.append(_text(here[0], here[1] + 0.35 * size, size, corner_letter(at), "#0f0"))
+    return [*lines, "</g>"]
+
+
+def _flag(x: float, y: float, half: float) -> list[str]:
+    """An arrow up, and a red pennant to its right."""
+    tip, base, wide = y - half, y - 0.4 * half, 0.14 * half
+    pole = [(x - 0.03 * half, tip), (x + 0.03 * half, tip), (x + 0.03 * half, base), (x - 0.03 * half, base)]
+    head = [(x, tip), (x + wide, tip + 0.25 * half), (x - wide, tip + 0.25 * half)]
+    top = base - 0.25 * half
+    pennant = [(x, top), (x + 2 * wide, top), (x + 2 * wide, base), (x, base)]
+    return [_polygon(pole, "#fff"), _polygon(head, "#fff"), _polygon(pennant, "#f00")]
+
+
+def _short(value: float) -> str:
+    """A coordinate to a thousandth of a pixel; whole pixels stay whole."""
+    return f"{value:.3f}".rstrip("0").rstrip(".").removesuffix("-0") or "0"
+
+
+def _text(x: float, y: float, size: float, text: str, color: str) -> str:
+    place = f'x="{_short(x)}" y="{_short(y)}" font-size="{_short(size)}" fill="{color}"'
+    return f"<text {place}>{escape(text)}</text>"
+
+
+def _polygon(points: list[tuple[float, float]], color: str) -> str:
+    return f'<polygon points="{" ".join(f"{_short(x)},{_short(y)}" for x, y in points)}" fill="{color}"/>'
