@@ -29,7 +29,8 @@ class Channel:
         layers: names of its EXR channels.
         dtype: their pixel type.
         empty: value of a pixel that sees nothing.
-        values: from scene, viewer and P hits to (layers, P), of any float or integer type.
+        values: from scene, viewer and hits to (layers, R, k), or (layers, R, 1) where a row's pixels
+            all have one value, of any float or integer type.
     """
 
     layers: tuple[str, ...]
@@ -39,7 +40,7 @@ class Channel:
 
 
 def depth(viewer: Viewer, position: FloatArray) -> FloatArray:
-    """Depth (P,) float64 of points (3, P) given relative to the eye, metres.
+    """Depth (R, k) float64 of points (3, R, k) given relative to the eye, metres.
 
     Along the look direction, or the distance from the eye where the viewer's depth is `radial`.
     """
@@ -56,7 +57,7 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
 
 
 def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    rgba = np.ones((4, len(hits.triangle)), dtype=np.float32)
+    rgba = np.ones((4, *hits.pixel.shape), dtype=np.float32)
     np.minimum(shade(scene, viewer.eye, hits), MOST_HALF, out=rgba[:3])
     return rgba
 
@@ -70,15 +71,15 @@ def _canonical_depth(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
 
 
 def _facet(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.facet[None] + 1
+    return hits.facet[None, :, None] + 1
 
 
 def _object(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return scene.object.take(hits.triangle)[None] + 1
+    return scene.object.take(hits.triangle)[None, :, None] + 1
 
 
 def _triangle(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.triangle[None] + 1
+    return hits.triangle[None, :, None] + 1
 
 
 def _normal(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
@@ -86,7 +87,7 @@ def _normal(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
 
 
 def _point(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.position + viewer.eye[:, None]
+    return hits.position + viewer.eye[:, None, None]
 
 
 _HALF, _FLOAT, _UINT = np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.uint32)

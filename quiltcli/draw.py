@@ -75,15 +75,19 @@ def set_stage(job: JobFile) -> Stage:
         QuiltError: a file is wrong, or the layout does not belong to the display.
     """
     facets, layout = layout_for(job.layout or PackSpec(), load_display(load_display_file(job.display)))
-    bleed = job.render.bleed
+    return stage_of(job, facets, layout, load_scene(load_scene_file(job.scene)), job.render.bleed)
+
+
+def stage_of(job: JobFile, facets: Facets, layout: Layout, scene: Scene, bleed: int) -> Stage:
+    """The stage of a display, its layout and a scene that are already there."""
     owners = pixel_owners(layout, bleed)
     return Stage(
         job=job,
         facets=facets,
         layout=layout,
-        scene=load_scene(load_scene_file(job.scene)),
+        scene=scene,
         parts=facet_parts(facets, layout, bleed),
-        blocks=cut_blocks(layout, bleed),
+        blocks=cut_blocks(layout, bleed, owners),
         owners=owners,
         fill=np.count_nonzero(owners > 0) / owners.size,
     )
@@ -195,14 +199,14 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
     visible = 0
     for hits in rasterize(frame, batch):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
-        visible += int(np.count_nonzero(stage.owners[hits.pixel] > 0))
+        visible += hits.inside
     return visible
 
 
 def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, samples: int) -> None:
     """Average the colour of several samples a pixel; what misses the scene counts as background."""
     found = [
-        (hits.pixel, CHANNELS["rgba"].values(stage.scene, frame.viewer, hits))
+        (hits.pixel.ravel(), CHANNELS["rgba"].values(stage.scene, frame.viewer, hits).reshape(4, -1))
         for sample in sample_places(samples)
         for hits in rasterize(frame, batch, sample)
     ]

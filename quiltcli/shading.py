@@ -8,6 +8,7 @@ pixel's value depends neither on the machine nor on which other pixels are shade
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -34,11 +35,13 @@ Values: TypeAlias = "Float32Array | np.float32"
 
 @dataclass(frozen=True)
 class _Points:
-    """n visible points; `material` values are (n,) arrays, or numbers where all points agree.
+    """Visible points in n rows of k, like the hits they come from.
+
+    What a material says is (n, 1), or a number where all points agree; vertex colours make it (n, k).
 
     Attributes:
-        normal: (3, n) unit shading normals, on the side of the eye.
-        eyeward: (3, n) unit directions to the eye.
+        normal: (3, n, k) unit shading normals, on the side of the eye.
+        eyeward: (3, n, k) unit directions to the eye.
         base: 3 values, base colour.
         steady: 3 values, light that needs no lamp: ambient and emission, or the colour of an unlit surface.
         diffuse: share of light for the Lambert base, over π.
@@ -58,29 +61,35 @@ class _Points:
 
 
 def shade(scene: Scene, eye: FloatArray, hits: Hits) -> Float32Array:
-    """Linear RGB (3, P) float32 of every hit.
+    """Linear RGB (3, R, k) float32 of every hit.
 
     Args:
         scene: the scene.
         eye: (3,) world metres.
-        hits: P visible points.
+        hits: R rows of k visible points.
     """
     table = _material_table(scene.materials, scene.lights.ambient)
-    result = np.empty((3, len(hits.triangle)), dtype=np.float32)
-    for start in range(0, result.shape[1], BLOCK):
-        part = slice(start, start + BLOCK)
+    result = np.empty((3, *hits.pixel.shape), dtype=np.float32)
+    for part in _blocks(hits):
         points = _points(scene, table, hits, part)
         result[:, part] = _radiance(scene, eye, hits.position[:, part], points)
     return result
 
 
 def shading_normals(scene: Scene, hits: Hits) -> Float32Array:
-    """Unit normals (3, P) float32 as shading uses them: interpolated, on the side of the eye."""
-    result = np.empty((3, len(hits.triangle)), dtype=np.float32)
-    for start in range(0, result.shape[1], BLOCK):
-        part = slice(start, start + BLOCK)
+    """Unit normals (3, R, k) float32 as shading uses them: interpolated, on the side of the eye."""
+    result = np.empty((3, *hits.pixel.shape), dtype=np.float32)
+    for part in _blocks(hits):
         result[:, part] = _normals(scene, hits, part)[0]
     return result
+
+
+def _blocks(hits: Hits) -> Iterator[slice]:
+    """Rows of hits, about `BLOCK` pixels at a time."""
+    rows, across = hits.pixel.shape
+    step = max(BLOCK // across, 1)
+    for start in range(0, rows, step):
+        yield slice(start, start + step)
 
 
 def _points(scene: Scene, table: Float32Array, hits: Hits, part: slice) -> _Points:
@@ -106,7 +115,7 @@ def _points(scene: Scene, table: Float32Array, hits: Hits, part: slice) -> _Poin
 
 
 def _normals(scene: Scene, hits: Hits, part: slice) -> tuple[Float32Array, Float32Array]:
-    """Unit shading normals on the side of the eye, and unit directions to the eye, both (3, n).
+    """Unit shading normals on the side of the eye, and unit directions to the eye, both (3, n, k).
 
     The triangle's own normal decides which side the eye is on, so interpolation cannot turn a
     silhouette inside out.
@@ -120,7 +129,7 @@ def _normals(scene: Scene, hits: Hits, part: slice) -> tuple[Float32Array, Float
 
 
 def _radiance(scene: Scene, eye: FloatArray, position: FloatArray, points: _Points) -> Float32Array:
-    """Light (3, n) towards the eye from all lamps and from none."""
+    """Light (3, n, k) towards the eye from all lamps and from none."""
     lights = scene.lights
     result = np.empty(points.normal.shape, dtype=np.float32)
     for k in range(3):
@@ -131,7 +140,7 @@ def _radiance(scene: Scene, eye: FloatArray, position: FloatArray, points: _Poin
     for direction, color in zip(lights.directional_direction, lights.directional_color, strict=True):
         _add_light(result, points, nv, -direction, color)
     for place, color in zip(lights.point_position, lights.point_color, strict=True):
-        offset = (place - eye).astype(np.float32)[:, None] - position.astype(np.float32)
+        offset = (place - eye).astype(np.float32)[:, None, None] - position.astype(np.float32)
         nearness = np.reciprocal(np.maximum(_dot(offset, offset), _LEAST_DISTANCE2))
         offset *= np.sqrt(nearness)
         _add_light(result, points, nv, offset, color, nearness)
@@ -155,12 +164,12 @@ def _add_light(
     the layer lets in and out again, so no surface returns more than it receives.
 
     Args:
-        result: (3, n), added to.
+        result: (3, n, k), added to.
         points: the points.
-        nv: (n,) cosine between normal and eye.
-        light: (3, n) unit directions to the lamp, or (3,) for all.
+        nv: (n, k) cosine between normal and eye.
+        light: (3, n, k) unit directions to the lamp, or (3,) for all.
         color: (3,) irradiance on a surface that faces the lamp.
-        falloff: (n,) factor of `color`.
+        falloff: (n, k) factor of `color`.
     """
     one, half = np.float32(1), np.float32(0.5)
     nl = np.maximum(_dot(points.normal, light), np.float32(0))
@@ -182,7 +191,7 @@ def _add_light(
 
 
 def _dot(a: Float32Array, b: Float32Array) -> Float32Array:
-    """Dot products (n,) of (3, n) with (3, n) or (3,), summed in the order x, y, z."""
+    """Dot products along the first axis of (3, …) arrays or a (3,), summed in the order x, y, z."""
     result: Float32Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     return result
 
@@ -195,11 +204,11 @@ def _fifth(x: Float32Array) -> Float32Array:
 def _interpolated(
     table: Float32Array, triangle: Int32Array, hits: Hits, part: slice, *, extra: bool = False
 ) -> Any:
-    """Values (3, n) between a triangle's corners; with `extra` also the table's last three columns."""
-    rows = np.ascontiguousarray(table.take(triangle, axis=0).T)
-    value = rows[0:3]
-    value += hits.b[part].astype(np.float32) * rows[3:6]
-    value += hits.c[part].astype(np.float32) * rows[6:9]
+    """Values (3, n, k) between a triangle's corners; with `extra` also the table's last columns (3, n, 1)."""
+    rows = np.ascontiguousarray(table.take(triangle, axis=0).T)[:, :, None]
+    value = hits.b[part] * rows[3:6]
+    value += rows[0:3]
+    value += hits.c[part] * rows[6:9]
     return (value, rows[9:12]) if extra else value
 
 
@@ -224,4 +233,4 @@ def _materials_at(table: Float32Array, material: Int32Array) -> tuple[Values, ..
     first = material[0]
     if len(table) == 1 or bool((material == first).all()):
         return tuple(table[first])
-    return tuple(np.ascontiguousarray(table.take(material, axis=0).T))
+    return tuple(np.ascontiguousarray(table.take(material, axis=0).T)[:, :, None])

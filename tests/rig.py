@@ -133,18 +133,17 @@ def picture(
     wanted, cut = triangles_in_range(local, triangles, eye)
     pairs = bin_triangles(local, triangles, wanted, facet_parts(facets, layout, bleed), rays.lit, eye.eye)
     sight = Sight(local, triangles, cut)
-    blocks = cut_blocks(layout, bleed)
+    blocks = cut_blocks(layout, bleed, owners)
     frame = Frame(eye, sight, rays, blocks, split_pairs(pairs, sight, rays, blocks), owners)
     triangle = np.full(owners.size, -1, np.int64)
     depth = np.full(owners.size, np.inf)
     for batch in batches(frame):
         for hits in rasterize(frame, batch, sample):
             assert (triangle[hits.pixel] == -1).all(), "a pixel came twice"
-            triangle[hits.pixel] = hits.triangle
-            square = (
-                eye.look @ hits.position if eye.depth == "planar" else np.linalg.norm(hits.position, axis=0)
-            )
-            depth[hits.pixel] = square
+            triangle[hits.pixel] = hits.triangle[:, None]
+            x, y, z = hits.position
+            planar = x * eye.look[0] + y * eye.look[1] + z * eye.look[2]
+            depth[hits.pixel] = planar if eye.depth == "planar" else np.sqrt(x * x + y * y + z * z)
     return Picture(facets, layout, owners.astype(np.int64), rays, frame, pairs, triangle, depth)
 
 

@@ -12,7 +12,14 @@ from wallscene import EYE, STRAIGHT, hits, lights, materials, wall
 from quiltcli import shading
 from quiltcli.geometry import normalized
 from quiltcli.scene import Materials
-from quiltcli.shading import shade, shading_normals
+
+
+def shade(*args):
+    return shading.shade(*args).reshape(3, -1)
+
+
+def shading_normals(*args):
+    return shading.shading_normals(*args).reshape(3, -1)
 
 
 def reference(normal, eyeward, light, color, metallic, roughness):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, OwnerArray, segments
 from quiltcli.layout import Layout, quilt_polygons
 
 SIDE = 512
@@ -33,6 +33,9 @@ class Blocks:
         address: (B,) flat quilt address of the block's first pixel.
         stride: (B,) pixels from one row to the next, the page's width.
         columns: (F,) blocks from left to right in a facet's rectangle.
+        tiles_across: (B,) microtiles from left to right in a block.
+        tile_start: (B+1,) offsets of every block's microtiles among those of all blocks.
+        interior: (microtiles,) those all of whose pixels lie in the block's facet.
     """
 
     start: IntArray
@@ -44,6 +47,9 @@ class Blocks:
     address: IntArray
     stride: IntArray
     columns: IntArray
+    tiles_across: IntArray
+    tile_start: IntArray
+    interior: BoolArray
 
 
 def facet_rectangles(layout: Layout, bleed: int) -> IntArray:
@@ -58,8 +64,14 @@ def facet_rectangles(layout: Layout, bleed: int) -> IntArray:
     return np.concatenate((low, high), axis=1).astype(np.int64)
 
 
-def cut_blocks(layout: Layout, bleed: int) -> Blocks:
-    """Cut every facet's rectangle, bleed included, into blocks, row by row."""
+def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
+    """Cut every facet's rectangle, bleed included, into blocks, row by row.
+
+    Args:
+        layout: the facets' places.
+        bleed: pixels drawn past a facet's edge.
+        owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
+    """
     rectangle = facet_rectangles(layout, bleed)
     extent = rectangle[:, 2:] - rectangle[:, :2]
     counts = -(-extent // SIDE)
@@ -70,17 +82,45 @@ def cut_blocks(layout: Layout, bleed: int) -> Blocks:
     y0 = rectangle[facet, 1] + rank // columns[facet] * SIDE
     page = layout.page[facet]
     stride = layout.pages[page, 0].astype(np.int64)
+    width = np.minimum(rectangle[facet, 2] - x0, SIDE)
+    height = np.minimum(rectangle[facet, 3] - y0, SIDE)
+    address = layout.page_offset[page] + y0 * stride + x0
+    across = -(-width // 8)
+    tile_start = np.concatenate(([0], np.cumsum(across * -(-height // 8))))
     return Blocks(
         start=start,
         facet=facet.astype(np.int32),
         x0=x0,
         y0=y0,
-        width=np.minimum(rectangle[facet, 2] - x0, SIDE),
-        height=np.minimum(rectangle[facet, 3] - y0, SIDE),
-        address=layout.page_offset[page] + y0 * stride + x0,
+        width=width,
+        height=height,
+        address=address,
         stride=stride,
         columns=columns,
+        tiles_across=across,
+        tile_start=tile_start,
+        interior=_interior_tiles(facet, width, height, address, stride, owners),
     )
+
+
+def _interior_tiles(
+    facet: IntArray,
+    width: IntArray,
+    height: IntArray,
+    address: IntArray,
+    stride: IntArray,
+    owners: OwnerArray,
+) -> BoolArray:
+    """Microtiles of all blocks that lie wholly in their block and in its facet's polygon."""
+    found = []
+    for f, w, h, first, step in zip(facet, width, height, address, stride, strict=True):
+        mine = np.zeros((-(-h // 8) * 8, -(-w // 8) * 8), dtype=np.bool_)
+        window = np.lib.stride_tricks.as_strided(
+            owners[first:], (h, w), (step * owners.itemsize, owners.itemsize), writeable=False
+        )
+        np.equal(window, f + 1, out=mine[:h, :w])
+        found.append(mine.reshape(mine.shape[0] // 8, 8, -1, 8).all(axis=(1, 3)).ravel())
+    return np.concatenate(found) if found else np.zeros(0, dtype=np.bool_)
 
 
 def cut_batches(pair_counts: IntArray, blocks: Blocks) -> list[tuple[int, int]]:
@@ -126,10 +166,11 @@ class Canvas:
 
 def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
     """An empty canvas for the blocks with these indices."""
-    across = -(-blocks.width[block] // 8)
-    down = -(-blocks.height[block] // 8)
-    tile_start = np.concatenate(([0], np.cumsum(across * down)))
-    return Canvas(block, tile_start, across, np.zeros(int(tile_start[-1]) * 64, dtype=np.int64))
+    tiles = blocks.tile_start[block + 1] - blocks.tile_start[block]
+    tile_start = np.concatenate(([0], np.cumsum(tiles)))
+    return Canvas(
+        block, tile_start, blocks.tiles_across[block], np.zeros(int(tile_start[-1]) * 64, dtype=np.int64)
+    )
 
 
 def ray_matrices(

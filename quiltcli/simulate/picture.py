@@ -7,14 +7,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from quiltcli.binning import facet_parts
 from quiltcli.display import Facets, lit_facets, triangulate
-from quiltcli.draw import Stage, draw_frame, new_buffers
+from quiltcli.draw import Stage, draw_frame, new_buffers, stage_of
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, dot, normalized
 from quiltcli.homography import eye_from_quilt
 from quiltcli.job import JobFile
-from quiltcli.layout import Layout, pixel_owners
-from quiltcli.raster import cut_blocks
+from quiltcli.layout import Layout
 from quiltcli.scene import Lights, Materials, Scene
 from quiltcli.simulate.lookup import Shown, look_up, quilt_places
 from quiltcli.viewer import Viewer
@@ -49,11 +47,7 @@ def visible_facets(stage: Stage, camera: Viewer, through: Camera, threads: int) 
 
 def camera_stage(job: JobFile, through: Camera, scene: Scene) -> Stage:
     """The stage of a picture: a scene behind the camera's one facet."""
-    facets, layout = through
-    owners = pixel_owners(layout)
-    return Stage(
-        job, facets, layout, scene, facet_parts(facets, layout, 0), cut_blocks(layout, 0), owners, 1.0
-    )
+    return stage_of(job, *through, scene, bleed=0)
 
 
 def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:
