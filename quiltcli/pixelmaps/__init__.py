@@ -1,6 +1,15 @@
 """Pixel maps: the layout in the forms other tools of the field read and write."""
 
-from quiltcli.pixelmaps.formats import FORMATS, Format, read_map, write_map
+from quiltcli.pixelmaps.formats import FORMATS, Format, known_display, read_map, write_map
 from quiltcli.pixelmaps.naming import facet_label, page_files, parse_label
 
-__all__ = ["FORMATS", "Format", "facet_label", "page_files", "parse_label", "read_map", "write_map"]
+__all__ = [
+    "FORMATS",
+    "Format",
+    "facet_label",
+    "known_display",
+    "page_files",
+    "parse_label",
+    "read_map",
+    "write_map",
+]

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from quiltcli.display import Facets
+from quiltcli.display import Facets, load_display
 from quiltcli.errors import LayoutError, Problem
+from quiltcli.job import load_display_file
 from quiltcli.job.base import suggest
 from quiltcli.layout import Layout, align
 from quiltcli.pixelmaps.jsonmap import read_json, write_json
@@ -121,3 +122,14 @@ def read_map(
         message = f"holds {entry.about}, a format that is only written (formats to read: {known})"
         raise LayoutError(Problem(message, file=str(path)))
     return entry.read(path, facets, size)
+
+
+def known_display(layout: Layout, path: Path | None = None) -> Facets | None:
+    """The display at `path`, or else the one the layout names, if that file is there.
+
+    Raises:
+        JobError, MeshError, DisplayError: it is there, but cannot be read.
+    """
+    if path is None and not (layout.display and Path(layout.display).is_file()):
+        return None
+    return load_display(load_display_file(path or layout.display))
