@@ -83,7 +83,9 @@ def intersect(target: Target, pixels: Places, row: IntArray, triangle: IntArray)
     for numerator in (for_u, for_v, across - for_u - for_v):
         slope = np.hypot(dot(numerator, du), dot(numerator, dv))
         value = dot(numerator, ray) * np.sign(det)
-        inside = np.minimum(inside, np.divide(value, slope, out=np.sign(value) * np.inf, where=slope > 0))
+        inside = np.minimum(
+            inside, np.divide(value, slope, out=np.where(value < 0, -np.inf, np.inf), where=slope > 0)
+        )
     with np.errstate(divide="ignore", invalid="ignore"):
         t = dot(e2, cross(-a, e1)) / det
         depth = t * measure_along(target.viewer, ray)
