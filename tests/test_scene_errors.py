@@ -99,6 +99,11 @@ def test_index_out_of_range(tmp_path):
     )
 
 
+def test_a_vertex_of_two_coordinates(tmp_path):
+    found = message(written(tmp_path, "m.obj", TRIANGLE.replace("v 1 0 0", "v 1 0")))
+    assert found == "m.obj:2: vertex with 2 coordinates (expected x y z)"
+
+
 def test_every_triangle_is_a_line(tmp_path):
     path = written(tmp_path, "m.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
     assert message(path) == "m.obj: every triangle is without area or not finite"

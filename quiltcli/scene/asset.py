@@ -46,6 +46,8 @@ def read_asset(path: Path) -> Asset:
             scene = trimesh_scene(path, asked, missing)
             parts = parts_of(scene, path.suffix.lower())
             textures = texture_count(scene, asked)
+        if any(part.vertices.shape[1:] != (3,) for part in parts):
+            raise ValueError("vertices without three coordinates")  # noqa: TRY301 - as if the reader had said so
     except Exception as error:  # whatever the reader meets in a damaged file
         if path.suffix.lower() not in _POLYGONS:
             raise _damaged(path, missing) from error
