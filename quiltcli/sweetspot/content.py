@@ -69,7 +69,7 @@ def content_at(
     return None if point is None else Content("plane", point=point)
 
 
-def default_content(samples: Samples, eye: FloatArray | None) -> Content:
+def default_content(samples: Samples, eye: FloatArray) -> Content:
     """Content at the middle of the display's bounds, or infinitely far away for an eye inside them.
 
     A display that is flat holds nothing: what it shows is taken to be far away, too.
@@ -77,10 +77,16 @@ def default_content(samples: Samples, eye: FloatArray | None) -> Content:
     low, high = samples.point.min(axis=0), samples.point.max(axis=0)
     offset = dot(samples.point - samples.point[0], samples.normal[0])
     flat = np.abs(offset).max() < 1e-6 * np.linalg.norm(high - low)
-    if flat or (eye is not None and ((low <= eye) & (eye <= high)).all()):
+    if flat or inside(samples, eye):
         return Content("distance", math.inf)
     x, y, z = ((low + high) / 2).tolist()
     return Content("plane", point=(x, y, z))
+
+
+def inside(samples: Samples, eye: FloatArray) -> bool:
+    """Whether an eye (3,) is within the bounds of the display."""
+    low, high = samples.point.min(axis=0), samples.point.max(axis=0)
+    return bool(((low <= eye) & (eye <= high)).all())
 
 
 def nearness(content: Content, samples: Samples, eye: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from quiltcli.display import Facets
 from quiltcli.errors import JobError, Problem
 from quiltcli.geometry import FloatArray
 from quiltcli.sweetspot.audience import MINIMISED, Served, audience_floor, best_eye, served
-from quiltcli.sweetspot.content import Content, default_content
+from quiltcli.sweetspot.content import Content, default_content, inside
 from quiltcli.sweetspot.distortion import Figures, Show, distortion, lit_points, show
 from quiltcli.sweetspot.floor import (
     Area,
@@ -165,6 +165,8 @@ def _floor(samples: Samples, eye: FloatArray, height: float, asked: Question) ->
     """The map that is asked for, or one about the eye of the display's size."""
     if asked.area is None:
         size = float(np.ptp(samples.point, axis=0).max())
+        # Inside a display nobody can step as far as it is wide.
+        size /= 4 if inside(samples, eye) else 1
         step = asked.step or default_step(size)
         return floor_of(area_about(eye, size, step), step, height)
     x0, z0, x1, z1 = asked.area
