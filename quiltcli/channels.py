@@ -29,8 +29,8 @@ class Channel:
         layers: names of its EXR channels.
         dtype: their pixel type.
         empty: value of a pixel that sees nothing.
-        values: from scene, viewer and hits to (layers, R, k), or (layers, R, 1) where a row's pixels
-            all have one value, of any float or integer type.
+        values: from scene, viewer and hits to (layers, k, G), or (layers, 1, G) where a group's
+            pixels all have one value, of any float or integer type.
     """
 
     layers: tuple[str, ...]
@@ -40,7 +40,7 @@ class Channel:
 
 
 def depth(viewer: Viewer, position: FloatArray) -> FloatArray:
-    """Depth (R, k) float64 of points (3, R, k) given relative to the eye, metres.
+    """Depth (k, G) float64 of points (3, k, G) given relative to the eye, metres.
 
     Along the look direction, or the distance from the eye where the viewer's depth is `radial`.
     """
@@ -71,15 +71,15 @@ def _canonical_depth(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
 
 
 def _facet(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.facet[None, :, None] + 1
+    return hits.facet[None, None] + 1
 
 
 def _object(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return scene.object.take(hits.triangle)[None, :, None] + 1
+    return scene.object.take(hits.triangle)[None, None] + 1
 
 
 def _triangle(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.triangle[None, :, None] + 1
+    return hits.triangle[None, None] + 1
 
 
 def _normal(scene: Scene, viewer: Viewer, hits: Hits) -> Values:

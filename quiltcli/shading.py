@@ -35,13 +35,13 @@ Values: TypeAlias = "Float32Array | np.float32"
 
 @dataclass(frozen=True)
 class _Points:
-    """Visible points in n rows of k, like the hits they come from.
+    """Visible points in n groups of k, like the hits they come from.
 
-    What a material says is (n, 1), or a number where all points agree; vertex colours make it (n, k).
+    What a material says is (n,), or a number where all points agree; vertex colours make it (k, n).
 
     Attributes:
-        normal: (3, n, k) unit shading normals, on the side of the eye.
-        eyeward: (3, n, k) unit directions to the eye.
+        normal: (3, k, n) unit shading normals, on the side of the eye.
+        eyeward: (3, k, n) unit directions to the eye.
         base: 3 values, base colour.
         steady: 3 values, light that needs no lamp: ambient and emission, or the colour of an unlit surface.
         diffuse: share of light for the Lambert base, over π.
@@ -61,34 +61,34 @@ class _Points:
 
 
 def shade(scene: Scene, eye: FloatArray, hits: Hits) -> Float32Array:
-    """Linear RGB (3, R, k) float32 of every hit.
+    """Linear RGB (3, k, G) float32 of every hit.
 
     Args:
         scene: the scene.
         eye: (3,) world metres.
-        hits: R rows of k visible points.
+        hits: G groups of k visible points.
     """
     table = _material_table(scene.materials, scene.lights.ambient)
     result = np.empty((3, *hits.pixel.shape), dtype=np.float32)
     for part in _blocks(hits):
         points = _points(scene, table, hits, part)
-        result[:, part] = _radiance(scene, eye, hits.position[:, part], points)
+        result[:, :, part] = _radiance(scene, eye, hits.position[:, :, part], points)
     return result
 
 
 def shading_normals(scene: Scene, hits: Hits) -> Float32Array:
-    """Unit normals (3, R, k) float32 as shading uses them: interpolated, on the side of the eye."""
+    """Unit normals (3, k, G) float32 as shading uses them: interpolated, on the side of the eye."""
     result = np.empty((3, *hits.pixel.shape), dtype=np.float32)
     for part in _blocks(hits):
-        result[:, part] = _normals(scene, hits, part)[0]
+        result[:, :, part] = _normals(scene, hits, part)[0]
     return result
 
 
 def _blocks(hits: Hits) -> Iterator[slice]:
-    """Rows of hits, about `BLOCK` pixels at a time."""
-    rows, across = hits.pixel.shape
-    step = max(BLOCK // across, 1)
-    for start in range(0, rows, step):
+    """Groups of hits, about `BLOCK` pixels at a time."""
+    pixels, groups = hits.pixel.shape
+    step = max(BLOCK // pixels, 1)
+    for start in range(0, groups, step):
         yield slice(start, start + step)
 
 
@@ -115,12 +115,12 @@ def _points(scene: Scene, table: Float32Array, hits: Hits, part: slice) -> _Poin
 
 
 def _normals(scene: Scene, hits: Hits, part: slice) -> tuple[Float32Array, Float32Array]:
-    """Unit shading normals on the side of the eye, and unit directions to the eye, both (3, n, k).
+    """Unit shading normals on the side of the eye, and unit directions to the eye, both (3, k, n).
 
     The triangle's own normal decides which side the eye is on, so interpolation cannot turn a
     silhouette inside out.
     """
-    eyeward = hits.position[:, part].astype(np.float32)
+    eyeward = hits.position[:, :, part].astype(np.float32)
     eyeward *= np.float32(-1) / np.sqrt(_dot(eyeward, eyeward))
     normal, own = _interpolated(scene.corner_normals, hits.triangle[part], hits, part, extra=True)
     length = np.sqrt(_dot(normal, normal) + np.float32(1e-30))
@@ -129,7 +129,7 @@ def _normals(scene: Scene, hits: Hits, part: slice) -> tuple[Float32Array, Float
 
 
 def _radiance(scene: Scene, eye: FloatArray, position: FloatArray, points: _Points) -> Float32Array:
-    """Light (3, n, k) towards the eye from all lamps and from none."""
+    """Light (3, k, n) towards the eye from all lamps and from none."""
     lights = scene.lights
     result = np.empty(points.normal.shape, dtype=np.float32)
     for k in range(3):
@@ -164,12 +164,12 @@ def _add_light(
     the layer lets in and out again, so no surface returns more than it receives.
 
     Args:
-        result: (3, n, k), added to.
+        result: (3, k, n), added to.
         points: the points.
-        nv: (n, k) cosine between normal and eye.
-        light: (3, n, k) unit directions to the lamp, or (3,) for all.
+        nv: (k, n) cosine between normal and eye.
+        light: (3, k, n) unit directions to the lamp, or (3,) for all.
         color: (3,) irradiance on a surface that faces the lamp.
-        falloff: (n, k) factor of `color`.
+        falloff: (k, n) factor of `color`.
     """
     one, half = np.float32(1), np.float32(0.5)
     nl = np.maximum(_dot(points.normal, light), np.float32(0))
@@ -204,11 +204,11 @@ def _fifth(x: Float32Array) -> Float32Array:
 def _interpolated(
     table: Float32Array, triangle: Int32Array, hits: Hits, part: slice, *, extra: bool = False
 ) -> Any:
-    """Values (3, n, k) between a triangle's corners; with `extra` also the table's last columns (3, n, 1)."""
-    rows = np.ascontiguousarray(table.take(triangle, axis=0).T)[:, :, None]
-    value = hits.b[part] * rows[3:6]
+    """Values (3, k, n) between a triangle's corners; with `extra` also the table's last columns (3, 1, n)."""
+    rows = np.ascontiguousarray(table.take(triangle, axis=0).T)[:, None]
+    value = hits.b[:, part] * rows[3:6]
     value += rows[0:3]
-    value += hits.c[part] * rows[6:9]
+    value += hits.c[:, part] * rows[6:9]
     return (value, rows[9:12]) if extra else value
 
 
@@ -233,4 +233,4 @@ def _materials_at(table: Float32Array, material: Int32Array) -> tuple[Values, ..
     first = material[0]
     if len(table) == 1 or bool((material == first).all()):
         return tuple(table[first])
-    return tuple(np.ascontiguousarray(table.take(material, axis=0).T)[:, :, None])
+    return tuple(np.ascontiguousarray(table.take(material, axis=0).T))

@@ -140,7 +140,7 @@ def picture(
     for batch in batches(frame):
         for hits in rasterize(frame, batch, sample):
             assert (triangle[hits.pixel] == -1).all(), "a pixel came twice"
-            triangle[hits.pixel] = hits.triangle[:, None]
+            triangle[hits.pixel] = hits.triangle
             x, y, z = hits.position
             planar = x * eye.look[0] + y * eye.look[1] + z * eye.look[2]
             depth[hits.pixel] = planar if eye.depth == "planar" else np.sqrt(x * x + y * y + z * z)

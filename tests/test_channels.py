@@ -82,5 +82,5 @@ def test_normals_face_the_eye():
 
 
 def test_hits_go_to_their_own_pixels():
-    seen = replace(hits([[0.0, 0], [0, 0], [-2, -3]]), pixel=np.array([[3], [1]]))
+    seen = replace(hits([[0.0, 0], [0, 0], [-2, -3]]), pixel=np.array([[3, 1]]))
     assert filled("Z", seen=seen, pixels=4)["Z"].tolist() == [np.inf, 3, np.inf, 2]

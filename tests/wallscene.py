@@ -49,12 +49,12 @@ def hits(position, b=0.25, c=0.5, triangle=None):
     position = np.array(position, np.float64).reshape(3, -1)
     count = position.shape[1]
     return Hits(
-        pixel=np.arange(count)[:, None],
+        pixel=np.arange(count)[None],
         facet=np.zeros(count, np.int32),
         triangle=np.zeros(count, np.int32) if triangle is None else np.array(triangle, np.int32),
-        b=np.broadcast_to(np.float32(b), count)[:, None],
-        c=np.broadcast_to(np.float32(c), count)[:, None],
-        position=position[:, :, None],
+        b=np.broadcast_to(np.float32(b), count)[None],
+        c=np.broadcast_to(np.float32(c), count)[None],
+        position=position[:, None],
         inside=count,
     )
 

@@ -18,8 +18,9 @@ from quiltcli.raster.keys import serial_of
 from quiltcli.raster.planes import Planes
 
 _CHUNK = 1 << 14
-_X: FloatArray = np.arange(8.0)
-_Y: FloatArray = np.arange(8.0)[:, None]
+_EIGHT: FloatArray = np.arange(8.0)[:, None]
+_DX: IntArray = np.tile(np.arange(8), 8)[:, None]
+_DY: IntArray = np.repeat(np.arange(8), 8)[:, None]
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,11 @@ class _Tiles:
     facet: Int32Array
     width: IntArray
     height: IntArray
+
+    def addresses(self, tile: IntArray) -> IntArray:
+        """Quilt addresses (64, G) of the pixels of microtiles (G,)."""
+        lines = self.address[tile] + self.stride[tile] * np.arange(8)[:, None]
+        return (lines[:, None] + np.arange(8)[:, None]).reshape(64, -1)
 
 
 @dataclass(frozen=True)
@@ -88,12 +94,9 @@ def read_canvas(
         tile = full[at : at + _CHUNK // 64]
         yield _whole_tiles(tile, rows.of_serial[serial_of(keys[tile, 0], bits)], tiles, rows, rays)
     rest = drawn[~whole]
-    local = np.flatnonzero(keys[rest])
-    address = rest[local >> 6] * 64 + (local & 63)
-    for at in range(0, address.size, _CHUNK):
-        part = address[at : at + _CHUNK]
-        row = rows.of_serial[serial_of(canvas.keys[part], bits)]
-        hits = _single_pixels(part, row, tiles, rows, rays, owners)
+    for at in range(0, rest.size, _CHUNK // 64):
+        tile = rest[at : at + _CHUNK // 64]
+        hits = _single_pixels(tile, keys[tile].T.copy(), tiles, rows, rays, owners, bits)
         if hits.pixel.size:
             yield hits
 
@@ -142,61 +145,72 @@ def _rows(chunks: list[Planes]) -> _Rows:
 
 
 def _whole_tiles(tile: IntArray, row: IntArray, tiles: _Tiles, rows: _Rows, rays: FloatArray) -> Hits:
-    """Hits of microtiles (R,) that are filled by one pair each, a row of 64 pixels for each."""
+    """Hits of microtiles (G,) that are filled by one pair each, a group of 64 pixels for each."""
     numbers = rows.numbers[row].T.copy()
     x, y = tiles.x[tile].astype(np.float64), tiles.y[tile].astype(np.float64)
-    count = tile.size
-
-    def over_tile(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-        lines = b[:, None, None] * _Y + (a * x + b * y + c)[:, None, None]
-        result: FloatArray = (lines + a[:, None, None] * _X).reshape(count, 64)
-        return result
-
-    inverse = over_tile(*numbers[9:12])
-    np.clip(inverse, numbers[12, :, None], numbers[13, :, None], out=inverse)
-    b, c = _weights(over_tile(*numbers[0:3]), over_tile(*numbers[3:6]), over_tile(*numbers[6:9]))
-    matrix = rays[tiles.place[tile]].transpose(1, 2, 0)
-    position = np.stack([over_tile(*matrix[i]) for i in range(3)])
+    inverse = _over_tiles(numbers[9:12], x, y)
+    np.clip(inverse, numbers[12], numbers[13], out=inverse)
+    b, c = _weights(*(_over_tiles(numbers[k : k + 3], x, y) for k in (0, 3, 6)))
+    position = _rays(tile, tiles, rays, x, y)
     position /= inverse
-    offset = tiles.stride[tile][:, None, None] * np.arange(8)[:, None] + np.arange(8)
-    pixel = (tiles.address[tile][:, None, None] + offset).reshape(count, 64)
+    pixel = tiles.addresses(tile)
     return Hits(pixel, tiles.facet[tile], rows.triangle[row], b, c, position, pixel.size)
 
 
-def _single_pixels(
-    address: IntArray, row: IntArray, tiles: _Tiles, rows: _Rows, rays: FloatArray, owners: OwnerArray
-) -> Hits:
-    """Hits of single pixels at these canvas addresses, where their facet owns the pixel."""
-    tile = address >> 6
-    dx, dy = address & 7, address >> 3 & 7
-    x, y = tiles.x[tile] + dx, tiles.y[tile] + dy
-    pixel = tiles.address[tile] + dy * tiles.stride[tile] + dx
-    facet = tiles.facet[tile]
-    there = np.flatnonzero((x < tiles.width[tile]) & (y < tiles.height[tile]))
-    owner = owners[pixel[there]]
-    own = np.flatnonzero(np.abs(owner) == facet[there] + 1)
-    inside = int(np.count_nonzero(owner[own] > 0))
-    own = there[own]
-    numbers = rows.numbers[row[own]].T.copy()
-    fx, fy = x[own].astype(np.float64), y[own].astype(np.float64)
+def _over_tiles(plane: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Values (64, G) of planes (3, G) at the pixels of microtiles that start at x, y (G,)."""
+    a, b, c = plane
+    lines = b * _EIGHT
+    lines += a * x + b * y + c
+    result: FloatArray = (lines[:, None] + a * _EIGHT).reshape(64, -1)
+    return result
 
-    def at_pixel(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-        result: FloatArray = a * fx + b * fy + c
+
+def _rays(tile: IntArray, tiles: _Tiles, rays: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Eye rays (3, 64, G) through the pixels of microtiles (G,) that start at x, y."""
+    matrix = np.ascontiguousarray(rays[tiles.place[tile]].transpose(1, 2, 0))
+    return np.stack([_over_tiles(line, x, y) for line in matrix])
+
+
+def _single_pixels(
+    tile: IntArray,
+    keys: IntArray,
+    tiles: _Tiles,
+    rows: _Rows,
+    rays: FloatArray,
+    owners: OwnerArray,
+    bits: int,
+) -> Hits:
+    """Hits of the drawn pixels of microtiles (M,) with keys (64, M), where their facet owns the pixel."""
+    x, y = tiles.x[tile] + _DX, tiles.y[tile] + _DY
+    drawn = np.flatnonzero((keys != 0) & (x < tiles.width[tile]) & (y < tiles.height[tile]))
+    pixel = tiles.addresses(tile).ravel()[drawn]
+    group = drawn % tile.size
+    facet = tiles.facet[tile][group]
+    owner = owners[pixel]
+    own = np.flatnonzero(np.abs(owner) == facet + 1)
+    drawn = drawn[own]
+    row = rows.of_serial[serial_of(keys.ravel()[drawn], bits)]
+    numbers = rows.numbers[row].T.copy()
+    fx, fy = x.ravel()[drawn].astype(np.float64), y.ravel()[drawn].astype(np.float64)
+
+    def at_pixels(k: int) -> FloatArray:
+        result: FloatArray = numbers[k] * fx + numbers[k + 1] * fy + numbers[k + 2]
         return result
 
-    inverse = np.clip(at_pixel(*numbers[9:12]), numbers[12], numbers[13])
-    b, c = _weights(at_pixel(*numbers[0:3]), at_pixel(*numbers[3:6]), at_pixel(*numbers[6:9]))
-    matrix = np.ascontiguousarray(rays[tiles.place[tile[own]]].transpose(1, 2, 0))
-    position = np.stack([at_pixel(*matrix[i]) for i in range(3)])
+    inverse = np.clip(at_pixels(9), numbers[12], numbers[13])
+    b, c = _weights(at_pixels(0), at_pixels(3), at_pixels(6))
+    corner = tiles.x[tile].astype(np.float64), tiles.y[tile].astype(np.float64)
+    position = _rays(tile, tiles, rays, *corner).reshape(3, -1)[:, drawn]
     position /= inverse
     return Hits(
-        pixel[own][:, None],
-        facet[own],
-        rows.triangle[row[own]],
-        b[:, None],
-        c[:, None],
-        position[..., None],
-        inside,
+        pixel=pixel[own][None],
+        facet=facet[own],
+        triangle=rows.triangle[row],
+        b=b[None],
+        c=c[None],
+        position=position[:, None],
+        inside=int(np.count_nonzero(owner[own] > 0)),
     )
 
 
