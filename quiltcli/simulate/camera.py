@@ -108,7 +108,9 @@ def frame_display(viewer: Viewer, corners: FloatArray, aspect: float, turn: bool
     """
     widest = math.tan(math.radians(WIDEST) / 2)
     local = corners - viewer.eye
-    camera = aimed(viewer, local.min(axis=0) + local.max(axis=0)) if turn else viewer
+    middle = local.min(axis=0) + local.max(axis=0)
+    turn = turn and float(dot(middle, middle)) > 1e-12 * float(np.abs(local).max()) ** 2
+    camera = aimed(viewer, middle) if turn else viewer
     for _ in range(8 if turn else 1):
         x, y, ahead = _tangents(camera, local)
         if not ahead.all():

@@ -20,6 +20,8 @@ _STEPS = (
     (1, 1, 0.9),
 )
 
+_NEAR = 5
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -30,10 +32,10 @@ class Comparison:
     Attributes:
         share: share of the picture's pixels that are compared.
         mean, percentile_99, maximum: of the errors.
-        psnr: decibels, all channels, for a peak of 1; infinite where nothing differs.
+        psnr: decibels, all channels, of the light cut at white, 1; infinite where nothing differs.
         flip: mean of the ꟻLIP map (Andersson et al. 2020), as at 67 pixels a degree.
         seams: error for the picture's contrast within a pixel of where two lit facets meet, over that of
-            the rest: 1 where seams do not show; not a number where there are no seams, or no contrast.
+            the pixels beside: 1 where seams do not show; not a number without seams or contrast.
         error: (H, W) errors, 0 where nothing is compared.
     """
 
@@ -62,7 +64,8 @@ def compare(shown: Float32Array, direct: Float32Array, covered: BoolArray, seam:
     found = error[covered]
     if not found.size:
         return Comparison(0.0, 0.0, 0.0, 0.0, math.inf, 0.0, math.nan, error.astype(np.float32))
-    square = float(np.mean(difference[covered] ** 2))
+    white = [np.clip(image[covered], 0, 1).astype(np.float64) for image in both]
+    square = float(np.mean((white[0] - white[1]) ** 2))
     return Comparison(
         share=found.size / covered.size,
         mean=float(found.mean()),
@@ -70,23 +73,32 @@ def compare(shown: Float32Array, direct: Float32Array, covered: BoolArray, seam:
         maximum=float(found.max()),
         psnr=-10 * math.log10(square) if square else math.inf,
         flip=float(flip_map(both[1], both[0])[covered].mean()),
-        seams=_seam_ratio(error, direct, covered & seam, covered & ~seam),
+        seams=_seam_ratio(error, direct, covered & seam, covered & _beside(seam)),
         error=error.astype(np.float32),
     )
 
 
+def _beside(seam: BoolArray) -> BoolArray:
+    """Pixels (H, W) near a seam but not at it: the facets are as dense there, seen from as far."""
+    near: NDArray[Any] = seam
+    for _ in range(_NEAR):
+        near = _around(near, np.maximum)
+    result: BoolArray = near & ~seam
+    return result
+
+
 def _seam_ratio(error: NDArray[Any], direct: Float32Array, seam: BoolArray, rest: BoolArray) -> float:
-    """Error for contrast at seams over that elsewhere.
+    """Error for contrast at seams over that beside them.
 
     Nearly all error is at edges of what is shown, and a seam has its share of these by chance: the
     contrast around a pixel says how much error it can have.
     """
     contrast = np.max(_around(direct, np.maximum) - _around(direct, np.minimum), axis=-1)
-    at_seams, elsewhere = (float(contrast[part].sum(dtype=np.float64)) for part in (seam, rest))
+    at_seams, around = (float(contrast[part].sum(dtype=np.float64)) for part in (seam, rest))
     beside = float(error[rest].sum())
-    if not (at_seams and elsewhere and beside):
+    if not (at_seams and around and beside):
         return math.nan
-    return float(error[seam].sum()) / at_seams * elsewhere / beside
+    return float(error[seam].sum()) / at_seams * around / beside
 
 
 def _around(image: NDArray[Any], reduce: np.ufunc) -> NDArray[Any]:
@@ -137,7 +149,7 @@ def figures(comparison: Comparison) -> list[tuple[str, str]]:
         ("FLIP", f"{comparison.flip:.5f}"),
     ]
     if not math.isnan(comparison.seams):
-        rows.append(("error at seams", f"{comparison.seams:.2f} × elsewhere, for the same contrast"))
+        rows.append(("error at seams", f"{comparison.seams:.2f} × that beside them, for the same contrast"))
     return rows
 
 
