@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from quiltcli.sweetspot.content import Content, content_at
-from quiltcli.sweetspot.study import Question, SweetSpot, sweet_spot
+from quiltcli.sweetspot.study import Question, SweetSpot, ask, sweet_spot
 
-__all__ = ["Content", "Question", "SweetSpot", "content_at", "sweet_spot"]
+__all__ = ["Content", "Question", "SweetSpot", "ask", "content_at", "sweet_spot"]

@@ -16,6 +16,7 @@ from quiltcli.errors import JobError
 from quiltcli.geometry import FloatArray, dot
 from quiltcli.sweetspot.samples import Samples, heights
 
+Point = tuple[float, float, float]
 _BESIDE = 1e-9  # content less near than this is on a plane the ray does not meet
 
 
@@ -32,7 +33,7 @@ class Content:
 
     kind: str
     metres: float = 0.0
-    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    point: Point = (0.0, 0.0, 0.0)
 
     def __str__(self) -> str:
         """What it is, for people."""
@@ -47,9 +48,7 @@ class Content:
         return f"{abs(self.metres):g} m {'behind' if self.metres > 0 else 'before'} the facets"
 
 
-def content_at(
-    depth: float | None, distance: float | None, point: tuple[float, float, float] | None
-) -> Content | None:
+def content_at(depth: float | None, distance: float | None, point: Point | None) -> Content | None:
     """The content that options ask for; None when they say nothing.
 
     Raises:
@@ -77,16 +76,10 @@ def default_content(samples: Samples, eye: FloatArray) -> Content:
     low, high = samples.point.min(axis=0), samples.point.max(axis=0)
     offset = dot(samples.point - samples.point[0], samples.normal[0])
     flat = np.abs(offset).max() < 1e-6 * np.linalg.norm(high - low)
-    if flat or inside(samples, eye):
+    if flat or ((low <= eye) & (eye <= high)).all():
         return Content("distance", math.inf)
     x, y, z = ((low + high) / 2).tolist()
     return Content("plane", point=(x, y, z))
-
-
-def inside(samples: Samples, eye: FloatArray) -> bool:
-    """Whether an eye (3,) is within the bounds of the display."""
-    low, high = samples.point.min(axis=0), samples.point.max(axis=0)
-    return bool(((low <= eye) & (eye <= high)).all())
 
 
 def nearness(content: Content, samples: Samples, eye: FloatArray) -> FloatArray:

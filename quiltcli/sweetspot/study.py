@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from quiltcli.display import Facets
+from quiltcli.display import Facets, load_display
 from quiltcli.errors import JobError, Problem
 from quiltcli.geometry import FloatArray
+from quiltcli.job import load_display_file, load_job
 from quiltcli.sweetspot.audience import MINIMISED, Served, audience_floor, best_eye, served
-from quiltcli.sweetspot.content import Content, default_content, inside
+from quiltcli.sweetspot.content import Content, Point, content_at, default_content
 from quiltcli.sweetspot.distortion import Figures, Show, distortion, lit_points, show
 from quiltcli.sweetspot.floor import (
     Area,
@@ -23,9 +26,11 @@ from quiltcli.sweetspot.floor import (
     floor_of,
     reaches,
 )
-from quiltcli.sweetspot.samples import Samples, sample_facets
+from quiltcli.sweetspot.samples import sample_facets
+from quiltcli.viewer import viewer_at
 
 _SEARCH_SAMPLES = 400
+_ROOM = 3  # times as far as one may go, on a map of the default size
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,44 @@ class SweetSpot:
         return values.reshape(len(self.floor.z), len(self.floor.x))
 
 
+def ask(
+    display: Path,
+    job: Path | None = None,
+    frame: int | None = None,
+    *,
+    eye: Point | None = None,
+    depth: float | None = None,
+    distance: float | None = None,
+    at: Point | None = None,
+    **how: Any,
+) -> tuple[Facets, Question]:
+    """Read what a question names.
+
+    Args:
+        display: a display file.
+        job: a job file whose eye is taken.
+        frame: at this frame; the job's first by default.
+        eye: the eye itself.
+        depth: of the content, as in `content_at`.
+        distance: of the content.
+        at: a point of the content.
+        how: the other fields of `Question`.
+
+    Raises:
+        JobError: a file cannot be read, or options contradict one another.
+    """
+    content = content_at(depth, distance, at)
+    if job is not None and eye is not None:
+        raise JobError("there are two eyes: give --eye or --job, not both")
+    if job is None and frame is not None:
+        raise JobError("--frame needs the --job it is a frame of")
+    place = None if eye is None else np.array(eye, dtype=np.float64)
+    if job is not None:
+        spec = load_job(job)
+        place = viewer_at(spec.viewer, spec.frames[0] if frame is None else frame).eye
+    return load_display(load_display_file(display)), Question(place, content, **how)
+
+
 def sweet_spot(facets: Facets, asked: Question) -> SweetSpot:
     """Find from where the content of a display may be looked at.
 
@@ -109,7 +152,7 @@ def sweet_spot(facets: Facets, asked: Question) -> SweetSpot:
     shown = show(samples, content, eye)
     if not shown.shown.any():
         raise JobError(_nothing(shown, content))
-    floor = _floor(samples, eye, height, asked)
+    floor = _floor(shown, height, asked)
     figures = distortion(shown, floor.places)
     return SweetSpot(
         display=facets,
@@ -161,16 +204,18 @@ def _nothing(shown: Show, content: Content) -> str:
     return f"no facet is lit towards the eye at {eye}"
 
 
-def _floor(samples: Samples, eye: FloatArray, height: float, asked: Question) -> Floor:
-    """The map that is asked for, or one about the eye of the display's size."""
-    if asked.area is None:
-        size = float(np.ptp(samples.point, axis=0).max())
-        # Inside a display nobody can step as far as it is wide.
-        size /= 4 if inside(samples, eye) else 1
-        step = asked.step or default_step(size)
-        return floor_of(area_about(eye, size, step), step, height)
-    x0, z0, x1, z1 = asked.area
-    return floor_of(asked.area, asked.step or default_step(max(x1 - x0, z1 - z0, 1e-9) / 2), height)
+def _floor(shown: Show, height: float, asked: Question) -> Floor:
+    """The map that is asked for, or one about the eye: of the display's size, or less that shows it all."""
+    if asked.area is not None:
+        x0, z0, x1, z1 = asked.area
+        return floor_of(asked.area, asked.step or default_step(max(x1 - x0, z1 - z0, 1e-9) / 2), height)
+    size = float(np.ptp(shown.samples.point, axis=0).max())
+    wide = floor_of(area_about(shown.eye, size, size / 20), size / 20, height)
+    metres, free = reaches(shown, wide, asked.limit_deg)["p95"]
+    if not free:
+        size = min(size, max(_ROOM * max(metres.values()), size / 20))
+    step = asked.step or default_step(size)
+    return floor_of(area_about(shown.eye, size, step), step, height)
 
 
 def _reaches(shown: Show, floor: Floor, figures: Figures, limit: float) -> dict[str, Reach]:
