@@ -121,9 +121,9 @@ def _figures(shown: Show, places: FloatArray, p95: bool) -> tuple[FloatArray, ..
     nothing = np.where(total > 0, 0.0, np.nan)
     mean = _over((angle * weight).sum(axis=1), total)
     most = angle.max(axis=1, initial=0) + nothing
-    # A tenth of a billionth is rounding of sums in another order.
+    # What is left of sums in another order is no darkness.
     dark = _over(everything - total, everything)
-    dark = np.where(dark < 1e-10, 0 * dark, dark)
+    dark = np.where(dark < 1e-10, np.abs(0 * dark), dark)
     return mean, _quantile(angle, weight, 0.95) + nothing if p95 else nothing + np.nan, most, dark
 
 

@@ -146,7 +146,8 @@ def sweet_spot(facets: Facets, asked: Question) -> SweetSpot:
     content = asked.content or default_content(samples, _someone(asked, height))
     best = None
     if people is not None:
-        found = best_eye(sample_facets(facets, _SEARCH_SAMPLES), content, people, asked.minimise)
+        few = sample_facets(facets, min(_SEARCH_SAMPLES, asked.samples))
+        found = best_eye(few, content, people, asked.minimise)
         best = served(samples, content, found.eye, people)
     eye = asked.eye if asked.eye is not None else best.eye if best is not None else np.zeros(3)
     shown = show(samples, content, eye)
