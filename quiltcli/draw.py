@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from quiltcli.binning import Pairs, Parts, bin_triangles, facet_parts
 from quiltcli.channels import CHANNELS, empty_buffers, exr_channels, fill
 from quiltcli.display import Facets, lit_facets, load_display
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, OwnerArray, cross, dot
+from quiltcli.geometry import BoolArray, FloatArray, OwnerArray, dot
 from quiltcli.homography import quilt_rays
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
@@ -139,7 +139,7 @@ def draw_frame(
         vertices = scene.vertices - viewer.eye
         wanted, cut = triangles_in_range(vertices, scene.triangles, viewer)
         if job.render.backface_culling:
-            wanted &= faces_eye(vertices, scene.triangles)
+            wanted &= faces_eye(scene, viewer.eye)
         pairs = bin_triangles(vertices, scene.triangles, wanted, stage.parts, rays.lit, viewer.eye)
     with clock.stage("prewarp"):
         sight = Sight(vertices, scene.triangles, cut)
@@ -165,10 +165,10 @@ def draw_frame(
     )
 
 
-def faces_eye(vertices: FloatArray, triangles: Int32Array) -> BoolArray:
-    """Triangles (T,) whose winding is counter-clockwise as seen from the origin of `vertices`."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    result: BoolArray = dot(a, cross(b, c)) < 0
+def faces_eye(scene: Scene, eye: FloatArray) -> BoolArray:
+    """Triangles (T,) whose winding is counter-clockwise as seen from `eye` (3,)."""
+    x, y, z, offset = scene.planes
+    result: BoolArray = x * eye[0] + y * eye[1] + z * eye[2] > offset
     return result
 
 

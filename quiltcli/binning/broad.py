@@ -59,24 +59,28 @@ def candidate_pairs(polygons: FloatArray, cones: FloatArray) -> tuple[IntArray, 
         cones: (K, m, 3) corners minus the eye.
 
     Returns:
-        Indices of polygons and of cones, without duplicates, ordered by polygon, then cone.
+        Indices of polygons and of cones, every pair once.
     """
-    keys = [np.zeros(0, dtype=np.int64)]
+    keys: list[IntArray] = []
     if len(polygons) and len(cones):
         middle = normalized(cones).reshape(-1, 3).mean(axis=0)
         if not middle.any():  # facets all around the eye: any direction will do
             middle[2] = -1.0
         for frame in cube_faces(middle):
-            keys.extend(_on_face(polygons, cones, frame))
-    found = np.unique(np.concatenate(keys))
-    return found // max(len(cones), 1), found % max(len(cones), 1)
+            found = _on_face(polygons, cones, frame)
+            if found.size:
+                keys.append(found)
+    if not keys:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    found = keys[0] if len(keys) == 1 else np.unique(np.concatenate(keys))
+    return np.divmod(found, max(len(cones), 1))
 
 
-def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> list[IntArray]:
+def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> IntArray:
     """Keys polygon·K + cone of the pairs whose rectangles meet on one face."""
     targets = footprints(cones, frame)
     if not targets.index.size:
-        return []
+        return np.zeros(0, dtype=np.int64)
     grid = _Grid(targets)
     movers = grid.within(footprints(polygons, frame))
     result = []
@@ -90,7 +94,7 @@ def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> list
         mover, target = grid.meeting(movers.take(part), cells[part])
         result.append(movers.index[first + mover] * len(cones) + targets.index[target])
         first = last
-    return result
+    return np.concatenate(result) if result else np.zeros(0, dtype=np.int64)
 
 
 def footprints(polygons: FloatArray, frame: FloatArray) -> Footprints:

@@ -17,6 +17,8 @@ from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross
 from quiltcli.layout import Layout
 
 _LONGEST_MITRE = 4.0
+_FEW = 4
+_MANY = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -166,22 +168,40 @@ def overlapping(
         first: (N,) indices into `triangle`.
         second: (N,) indices into `planes`.
     """
-    meets = np.ones(first.size, dtype=np.bool_)
     alive = np.arange(first.size)
-    for edge in range(planes.shape[1]):
-        alive = _not_outside(planes[:, edge], triangle, second, first, alive)
-    own = cone_planes(triangle) if triangle.size else triangle
-    for edge in range(triangle.shape[1]):
-        alive = _not_outside(own[:, edge], wide, first, second, alive)
-    meets[:] = False
+    alive = _within(planes, triangle, second, first, alive)
+    # Of very many, a polygon with few candidates is small: its own edges would reject next to nothing.
+    few = _FEW if alive.size > _MANY else 0
+    large = np.bincount(first[alive], minlength=len(triangle))[first[alive]] > few
+    rest = alive[large]
+    if rest.size:
+        used, place = np.unique(first[rest], return_inverse=True)
+        own = cone_planes(triangle[used])
+        kept = _within(own, wide, place, second[rest], np.arange(rest.size))
+        alive = np.concatenate((alive[~large], rest[kept]))
+    meets = np.zeros(first.size, dtype=np.bool_)
     meets[alive] = True
     return meets
 
 
-def _not_outside(
-    plane: FloatArray, corners: FloatArray, of_plane: IntArray, of_corners: IntArray, alive: IntArray
+def _within(
+    planes: FloatArray, corners: FloatArray, of_planes: IntArray, of_corners: IntArray, alive: IntArray
 ) -> IntArray:
-    """Those `alive` pairs of which some corner is not on the outer side of the plane."""
-    n = plane[of_plane[alive]]
-    points = corners[of_corners[alive]]
-    return alive[(dot(points, n[:, None, :]) >= 0).any(axis=1)]
+    """Those `alive` pairs of which no plane has all the corners on its outer side.
+
+    Args:
+        planes: (K, m, 3) inward planes.
+        corners: (T, n, 3) polygons.
+        of_planes: (N,) index into `planes` of each pair.
+        of_corners: (N,) index into `corners`.
+        alive: pairs to look at.
+    """
+    columns = np.ascontiguousarray(corners.transpose(1, 2, 0))
+    for edge in np.ascontiguousarray(planes.transpose(1, 2, 0)):
+        nx, ny, nz = edge[:, of_planes[alive]]
+        outside = np.ones(alive.size, dtype=np.bool_)
+        for x, y, z in columns:
+            at = of_corners[alive]
+            outside &= nx * x[at] + ny * y[at] + nz * z[at] < 0
+        alive = alive[~outside]
+    return alive

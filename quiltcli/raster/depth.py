@@ -70,6 +70,8 @@ def triangles_in_range(
     if viewer.depth == "radial":
         return _radial_range(vertices, triangles, viewer)
     depth = dot(vertices, viewer.look)
+    if depth.size and viewer.near <= depth.min() and depth.max() <= viewer.far:
+        return np.ones(len(triangles), dtype=np.bool_), np.zeros(len(triangles), dtype=np.bool_)
     nearest, farthest = _least_and_greatest(depth, triangles)
     inside = (farthest >= viewer.near) & (nearest <= viewer.far)
     return inside, inside & ((nearest < viewer.near) | (farthest > viewer.far))

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, cross, normalized
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, cross, dot, normalized
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,13 @@ class Scene:
     lights: Lights
     background: Float32Array
     notices: tuple[str, ...]
+
+    @cached_property
+    def planes(self) -> FloatArray:
+        """Planes (4, T) of the triangles: normal n by the winding, and n·p for the points p of the plane."""
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        normal = cross(b - a, c - a)
+        return np.concatenate((normal.T, dot(normal, a)[None]))
 
     @cached_property
     def corner_normals(self) -> Float32Array:
