@@ -211,8 +211,8 @@ def _rooms(spot: SweetSpot, measure: str, frame: _Frame) -> Iterator[Item]:
         tip, across = centre + way * length, np.array([-way[1], way[0]])
         ends = np.stack((tip - 7 * across, tip + 7 * across))
         yield Lines((np.stack((centre, tip)), ends), PAPER, 1.6)
-        x, y = tip + way * (14 + 20 * abs(way[0]))
-        yield Label(x, y, 14, f"{reach.metres[name]:.2f} m", INK, "middle")
+        x, y = tip + way * (15 + 22 * abs(way[0]))
+        yield Label(x, y, 16, f"{reach.metres[name]:.2f} m", INK, "middle")
     yield _disc(*centre)
 
 
