@@ -4,9 +4,12 @@ PYTHON ?= python3
 ENV := .venv
 PY := $(ENV)/bin/python
 STAMP := $(ENV)/.installed
+QUILT := $(PY) -m quiltcli
+SEEN := out/demo/pictures
+DOCS := docs/pictures
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo test test-long lint types format bench golden clean
+.PHONY: help env demo pictures test test-long lint types format bench golden clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -23,8 +26,29 @@ $(STAMP): pyproject.toml
 	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
 
-demo: env ## render a short orbit and pictures of it
-	$(PY) -m quiltcli render scenes/demo.yaml --overwrite
+demo: env ## render two short walks and pictures of them
+	$(QUILT) render scenes/demo.yaml --overwrite
+	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(SEEN)/box_quilt.png
+	$(QUILT) simulate scenes/demo.yaml -f 2,4,6 -o $(SEEN)/box_eye.####.png --heat-map $(SEEN)/box_errors.####.png
+	$(QUILT) simulate scenes/demo.yaml -f 6 -o $(SEEN)/box_aside.0006.png --from=-0.35,0.55,1.05 --edges
+	$(QUILT) render scenes/demo_sphere.yaml --overwrite
+	$(QUILT) preview out/demo_sphere/quilt/page_01.0004.exr -o $(SEEN)/sphere_quilt.png
+	$(QUILT) simulate scenes/demo_sphere.yaml -f 4,8 -o $(SEEN)/sphere_eye.####.png
+	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(SEEN)/sphere_aside.0004.png --from 0.9,0.6,1.0 --edges
+	@echo; echo "Pictures to look at are in $(CURDIR)/$(SEEN):"
+	@echo "  *_eye.*    the display as the viewer sees it      *_aside.*  from another place"
+	@echo "  *_quilt    the quilt, tone-mapped                 *_errors.* what differs from a direct picture"
+	@echo "Quilts, facet images and reports are in $(CURDIR)/out/demo and $(CURDIR)/out/demo_sphere"
+
+# Reduced to a palette of 256 colours: a picture in the repository is a few dozen kilobytes.
+pictures: env ## make the pictures of the README anew
+	$(QUILT) simulate scenes/demo.yaml -f 6 -o $(DOCS)/box_eye.png --size 960x720 --supersample 3
+	$(QUILT) simulate scenes/demo.yaml -f 6 -o $(DOCS)/box_aside.png --size 960x720 --supersample 3 --from=-0.35,0.55,1.05 --edges
+	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(DOCS)/sphere_eye.png --size 960x720 --supersample 3
+	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(DOCS)/sphere_aside.png --size 960x720 --supersample 3 --from 0.9,0.6,1.0 --edges
+	$(QUILT) render scenes/demo.yaml -f 6 --overwrite
+	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(DOCS)/box_quilt.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2

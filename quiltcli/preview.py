@@ -112,6 +112,7 @@ def preview_paths(images: Sequence[Path], output: Path) -> list[tuple[Path, Path
         if len(images) > 1:
             wrong = f"is one picture for {len(images)} images, expected a folder"
             raise OutputError(Problem(wrong, file=str(output)))
+        make_folder(output.parent)
         return [(images[0], output)]
     pairs = [(image, output / f"{image.stem}.png") for image in images]
     if len({picture for _, picture in pairs}) < len(pairs):
