@@ -140,7 +140,7 @@ def test_a_floor_up_to_the_horizon(tmp_path, height):
     # The horizon lies at the height of the eye; the panel is moved so that centres are just below.
     panel = [(x, y + height + 0.5 / 32 - 0.1 / 32, z) for x, y, z in WALL]
     job = write_job(tmp_path, (panel, [[0, 1, 2, 3]]), floor, eye, (0.1, height, 0), density=32, far=1e6)
-    good(job, 1900)
+    good(job, 100)
 
 
 @pytest.mark.parametrize("depth", ["planar", "radial"])
