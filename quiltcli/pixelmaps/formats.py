@@ -13,7 +13,7 @@ from quiltcli.job.base import suggest
 from quiltcli.layout import Layout, align
 from quiltcli.pixelmaps.jsonmap import read_json, write_json
 from quiltcli.pixelmaps.mpcdiread import read_mpcdi
-from quiltcli.pixelmaps.mpcdiwrite import write_mpcdi
+from quiltcli.pixelmaps.mpcdiwrite import write_mpcdi, write_mpcdi_1
 from quiltcli.pixelmaps.objmap import read_obj_map, write_obj_map
 from quiltcli.pixelmaps.panels import read_panels, write_panels
 from quiltcli.pixelmaps.stmap import write_st_maps
@@ -45,6 +45,7 @@ FORMATS: dict[str, Format] = {
     "csv": Format(".csv", "table of panels", write_panels, read_panels),
     "json": Format(".json", "everything a layout says", write_json, read_json),
     "mpcdi": Format(".mpcdi", "MPCDI 2.0 archive, 2D media profile", write_mpcdi, read_mpcdi),
+    "mpcdi1": Format(".mpcdi", "MPCDI 1 archive, 2D media profile", write_mpcdi_1, read_mpcdi),
     "st": Format(".exr", "ST maps of pages and facets", write_st_maps),
     "png": Format(".png", "template picture at exact pixels, one file a page", write_png_template),
     "svg": Format(".svg", "template drawing, one file a page", write_svg_template),
@@ -64,10 +65,9 @@ def format_of(path: Path, name: str | None = None) -> Format:
         hint = f"; did you mean {near}?" if near else ""
         raise LayoutError(Problem(f"unknown format {name!r} (known: {', '.join(FORMATS)}{hint})"))
     for entry in FORMATS.values():
-        if path.suffix.lower() == entry.suffix or (path.name.lower().endswith(".mpcdi.xml") and entry.read
-                                                   is read_mpcdi):  # fmt: skip
+        if path.name.lower().endswith((entry.suffix, f"{entry.suffix}.xml")):
             return entry
-    known = ", ".join(entry.suffix for entry in FORMATS.values())
+    known = ", ".join(dict.fromkeys(entry.suffix for entry in FORMATS.values()))
     found = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
     raise LayoutError(Problem(f"has {found}, which names no format (expected {known})", file=str(path)))
 

@@ -18,7 +18,7 @@ from quiltcli.layout import Layout, quilt_polygons, whole_pixel
 from quiltcli.layout.file import layout_from_file
 from quiltcli.pixelmaps.placing import adopted, panel, placed_rows
 from quiltcli.wholefile import write_text
-from quiltcli.yamlfile import parse_yaml
+from quiltcli.yamlfile import Source, parse_yaml
 
 DERIVED = ("name", "x", "y", "width", "height", "rotation", "mirror", "quilt_polygon")
 """Keys of a facet that repeat what others say; they are not read."""
@@ -71,8 +71,13 @@ def _entries(layout: Layout, facets: Facets | None) -> list[dict[str, Any]]:
 
 def read_json(path: Path, display: Facets | None, size: tuple[int, int] | None) -> Layout:
     """Read what `write_json` wrote; `size` says nothing new, for the pages have theirs."""
+    layout = layout_from_file(_model(path, _data(path)))
+    return adopted(layout, display, path)
+
+
+def _data(path: Path) -> Any:
     try:
-        json.loads(path.read_bytes())
+        return json.loads(path.read_bytes())
     except OSError as error:
         raise LayoutError(Problem(f"cannot be read: {error.strerror}", file=str(path))) from None
     except json.JSONDecodeError as error:
@@ -80,21 +85,22 @@ def read_json(path: Path, display: Facets | None, size: tuple[int, int] | None) 
         raise LayoutError(Problem(message, str(path), error.lineno, error.colno)) from None
     except UnicodeDecodeError:
         raise LayoutError(Problem("is not JSON: it is not UTF-8 text", file=str(path))) from None
-    layout = layout_from_file(_model(path))
-    return adopted(layout, display, path)
 
 
-def _model(path: Path) -> LayoutFile:
-    """The file's model. JSON is YAML as well, and that reader knows where each value stands."""
-    found = parse_yaml(path)
-    for entry in found.data["facets"] if isinstance(found.data.get("facets"), list) else []:
+def _model(path: Path, data: Any) -> LayoutFile:
+    """The file's model. JSON is YAML as well, and that reader, though slow, knows where each value stands."""
+    try:
+        model = LayoutFile.model_validate(_essential(data), context={"base": path.parent})
+    except ValidationError as error:
+        found = parse_yaml(path)
+        raise JobError([*found.problems, *problems_of(error, LayoutFile, found.source)]) from None
+    attach(model, Source(path))
+    return model
+
+
+def _essential(data: Any) -> Any:
+    """The data without what only repeats other keys."""
+    for entry in data["facets"] if isinstance(data, dict) and isinstance(data.get("facets"), list) else []:
         for key in DERIVED if isinstance(entry, dict) else ():
             entry.pop(key, None)
-    try:
-        model = LayoutFile.model_validate(found.data, context={"base": path.parent})
-    except ValidationError as error:
-        raise JobError([*found.problems, *problems_of(error, LayoutFile, found.source)]) from None
-    if found.problems:
-        raise JobError(found.problems)
-    attach(model, found.source)
-    return model
+    return data

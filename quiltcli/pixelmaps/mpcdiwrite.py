@@ -10,6 +10,7 @@ mirrors are in the warp, the polygon in the alpha map.
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,14 +32,23 @@ from quiltcli.unmap import facet_image
 from quiltcli.wholefile import whole_file
 
 XML, SUPPLEMENT = "mpcdi.xml", "quilt.json"
+_ROOTS = {
+    1: '<MPCDI profile="2d" level="1" date="1980-01-01 00:00:00" version="1.0">',
+    2: '<MPCDI profile="2d" geometry="1" level="1" color="1" version="2.0">',
+}
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the same layout gives the same bytes whenever it is written
 
 
-def write_mpcdi(layout: Layout, facets: Facets | None, path: Path) -> list[Path]:
+def write_mpcdi_1(layout: Layout, facets: Facets | None, path: Path) -> list[Path]:
+    """Write the archive in the spelling of version 1, for players that know no other."""
+    return write_mpcdi(layout, facets, path, version=1)
+
+
+def write_mpcdi(layout: Layout, facets: Facets | None, path: Path, *, version: int = 2) -> list[Path]:
     """Write the archive; quilt.json holds what MPCDI has no place for, and may be deleted (OutputError)."""
     owners = pixel_owners(layout)
     with whole_file(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        _add(archive, XML, mpcdi_xml(layout, facets).encode())
+        _add(archive, XML, mpcdi_xml(layout, facets, version).encode())
         _add(archive, SUPPLEMENT, json_text(layout, facets).encode())
         for row in placed_rows(layout):
             label = _label(layout, facets, row)
@@ -57,11 +67,11 @@ def _label(layout: Layout, facets: Facets | None, row: int) -> str:
     return facet_label(int(layout.facet[row]), facets.names if facets else ())
 
 
-def mpcdi_xml(layout: Layout, facets: Facets | None = None) -> str:
-    """The text of mpcdi.xml."""
+def mpcdi_xml(layout: Layout, facets: Facets | None = None, version: int = 2) -> str:
+    """The text of mpcdi.xml; version 1 differs in its first element and in the spelling of resolutions."""
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
-        '<MPCDI profile="2d" geometry="1" level="1" color="1" version="2.0">',
+        _ROOTS[version],
         "  <display>",
     ]
     for page, (width, height) in enumerate(layout.pages.tolist()):
@@ -72,7 +82,10 @@ def mpcdi_xml(layout: Layout, facets: Facets | None = None) -> str:
     lines += ["  </display>", "  <files>"]
     for row in placed_rows(layout):
         lines += _fileset(_label(layout, facets, row))
-    return "\n".join([*lines, "  </files>", "</MPCDI>"]) + "\n"
+    text = "\n".join([*lines, "  </files>", "</MPCDI>"]) + "\n"
+    return (
+        re.sub(r" ([xy])Resolution=", lambda m: f" {m[1].upper()}resolution=", text) if version == 1 else text
+    )
 
 
 def _region(layout: Layout, row: int, label: str) -> str:

@@ -223,9 +223,7 @@ def _matched(faces: _Faces, display: Facets, path: Path) -> tuple[FloatArray, In
     problems = []
     for face in range(faces.mesh.count):
         corners = slice(int(faces.mesh.corner_start[face]), int(faces.mesh.corner_start[face + 1]))
-        away = centres - places[corners].mean(axis=0)
-        row = int(dot(away, away).argmin())
-        order = _same_corners(display.polygon(row), places[corners])
+        row, order = _facet_of(faces.mesh.names[face], places[corners], display, centres)
         if order is None or page[row] >= 0:
             name = f" ({faces.mesh.names[face]})" if faces.mesh.names[face] else ""
             wrong = f"lies on no facet of {display.path}; the nearest is {row + 1}"
@@ -237,6 +235,20 @@ def _matched(faces: _Faces, display: Facets, path: Path) -> tuple[FloatArray, In
         page[row] = faces.page[face]
     entries(path, problems)
     return quilt, page
+
+
+def _facet_of(
+    name: str, corners: FloatArray, display: Facets, centres: FloatArray
+) -> tuple[int, IntArray | None]:
+    """The facet a face lies on, by its name else the nearest, and the order of its corners or None."""
+    label = parse_label(name)
+    if label and label[0] <= display.count:
+        order = _same_corners(display.polygon(label[0] - 1), corners)
+        if order is not None:
+            return label[0] - 1, order
+    away = centres - corners.mean(axis=0)
+    row = int(dot(away, away).argmin())
+    return row, _same_corners(display.polygon(row), corners)
 
 
 def _same_corners(polygon: FloatArray, corners: FloatArray) -> IntArray | None:

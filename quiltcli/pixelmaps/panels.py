@@ -158,12 +158,12 @@ def _check_columns(table: _Table, display: Facets | None) -> None:
     missing = [name for name in needed if name not in table.columns]
     hint = "; name the display, and it says the rest" if {*missing} & {*VECTORS, "polygon"} else ""
     if missing:
-        table.problem(
-            f"has no column {', '.join(missing)} (columns found: {', '.join(table.columns)}{hint})", 1
-        )
-    elif not table.lines:
-        table.problem("has no lines below its column names (expected a line a facet)", 1)
-    entries(table.path, table.problems)
+        found = ", ".join(table.columns)
+        message = f"has no column {', '.join(missing)} (columns found: {found}{hint})"
+        raise LayoutError(Problem(message, str(table.path), 1))
+    if not table.lines:
+        message = "has no lines below its column names (expected a line a facet)"
+        raise LayoutError(Problem(message, str(table.path), 1))
 
 
 def _ids(table: _Table, display: Facets | None) -> list[int]:

@@ -164,8 +164,8 @@ def display_rasters(display: Facets, facet: Sequence[int] | Int32Array) -> Raste
 
 
 def entries(path: Path, problems: Sequence[Problem], most: int = 50) -> None:
-    """Raise one `LayoutError` with the first problems and the count of the rest; nothing when none."""
-    shown = list(problems[:most])
+    """Raise one `LayoutError` with the problems in the order of their lines, if there are any."""
+    shown = sorted(problems, key=lambda problem: problem.line)[:most]
     if len(problems) > most:
         shown.append(Problem(f"and {len(problems) - most} problems more", file=str(path)))
     raise_all(LayoutError, shown)

@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from quiltcli.display import Facets
+from quiltcli.glyphs import HEIGHT, text_mask, text_width
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.pattern import corner_letter, facet_color, roomiest
 from quiltcli.patternfiles import page_pattern, write_png
@@ -41,7 +42,7 @@ def svg_template(layout: Layout, facets: Facets | None, page: int) -> str:
     names = facets.names if facets else ()
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}"'
-        f' viewBox="0 0 {width} {height}" font-family="monospace" text-anchor="middle">',
+        f' viewBox="0 0 {width} {height}">',
     ]
     for row in placed_rows(layout):
         if layout.page[row] == page:
@@ -63,20 +64,21 @@ def _facet(layout: Layout, row: int, label: str, name: str) -> list[str]:
     half = radius * 0.7
     lines = [
         f'<g id="{escape(label)}" transform="matrix({matrix})">',
+        f"<title>{escape(f'{layout.facet[row]} {name}'.strip())}</title>",
         f'<clipPath id="{escape(label)}_clip"><polygon points="{points}"/></clipPath>',
         # Half of a line lies outside: two pixels, clipped, are one inside.
         f'<polygon points="{points}" fill="{fill}" stroke="#fff" stroke-width="2"'
         f' clip-path="url(#{escape(label)}_clip)"/>',
-        _text(x, y + 0.35 * half, 0.9 * half, str(layout.facet[row]), "#fff"),
+        _text(x, y + 0.05 * half, 0.75 * half, str(layout.facet[row]), "#fff"),
     ]
     if name:
-        size = min(0.5 * half, 3 * half / len(name))
-        lines.append(_text(x, y + 0.95 * half, size, name, "#ff0"))
+        size = min(0.4 * half, 1.7 * half * HEIGHT / text_width(name))
+        lines.append(_text(x, y + 0.72 * half, size, name, "#ff0"))
     lines += _flag(x, y, half)
     for at, corner in enumerate(polygon):
-        size = min(0.4 * radius, 0.33 * float(np.hypot(*(centre - corner))))
+        size = min(0.3 * radius, 0.25 * float(np.hypot(*(centre - corner))))
         here = corner + (centre - corner) * 0.25
-        lines.append(_text(here[0], here[1] + 0.35 * size, size, corner_letter(at), "#0f0"))
+        lines.append(_text(here[0], here[1], size, corner_letter(at), "#0f0"))
     return [*lines, "</g>"]
 
 
@@ -85,7 +87,7 @@ def _flag(x: float, y: float, half: float) -> list[str]:
     tip, base, wide = y - half, y - 0.4 * half, 0.14 * half
     pole = [(x - 0.03 * half, tip), (x + 0.03 * half, tip), (x + 0.03 * half, base), (x - 0.03 * half, base)]
     head = [(x, tip), (x + wide, tip + 0.25 * half), (x - wide, tip + 0.25 * half)]
-    top = base - 0.25 * half
+    top = base - 0.16 * half
     pennant = [(x, top), (x + 2 * wide, top), (x + 2 * wide, base), (x, base)]
     return [_polygon(pole, "#fff"), _polygon(head, "#fff"), _polygon(pennant, "#f00")]
 
@@ -96,8 +98,19 @@ def _short(value: float) -> str:
 
 
 def _text(x: float, y: float, size: float, text: str, color: str) -> str:
-    place = f'x="{_short(x)}" y="{_short(y)}" font-size="{_short(size)}" fill="{color}"'
-    return f"<text {place}>{escape(text)}</text>"
+    """Text of this height as filled dots, centred at (x, y): a font would differ from machine to machine."""
+    mask = text_mask(text)
+    dot = size / HEIGHT
+    runs = []
+    for j, line in enumerate(mask):
+        change = np.flatnonzero(np.diff(line.astype(np.int8), prepend=0, append=0)).tolist()
+        runs += [
+            f"M{start},{j}h{stop - start}v1h{start - stop}z"
+            for start, stop in zip(change[::2], change[1::2], strict=True)
+        ]
+    left, top = x - dot * mask.shape[1] / 2, y - dot * HEIGHT / 2
+    place = f"translate({_short(left)} {_short(top)}) scale({_short(dot)})"
+    return f'<path transform="{place}" d="{"".join(runs)}" fill="{color}"/>'
 
 
 def _polygon(points: list[tuple[float, float]], color: str) -> str:
