@@ -20,6 +20,7 @@ from quiltcli.sweetspot.content import default_content, nearness
 from quiltcli.sweetspot.distortion import angles_deg, distortion, show, solid_angles
 from quiltcli.sweetspot.floor import Floor, area_under, contour, default_step, floor_of
 from quiltcli.sweetspot.picture import dashes, sweet_spot_picture
+from quiltcli.sweetspot.plan import CONTENT, Lines, draw_plan
 from quiltcli.sweetspot.report import as_data, lines, reach_rows
 from quiltcli.sweetspot.samples import sample_facets
 from quiltcli.sweetspot.scale import COLOURS, heat, ticks
@@ -381,6 +382,16 @@ def test_heat_has_the_colours_of_the_legend():
     ]
 
 
+def test_walls_are_lines_from_above_and_all_stays_on_the_picture():
+    plan = draw_plan(sweet_spot(CORNER, ask(content=DEEP, limit_deg=30)))
+    lines = [item for item in plan.items if isinstance(item, Lines)]
+    content = next(item.paths for item in lines if item.color == CONTENT)
+    assert [path.shape for path in content] == [(2, 2), (2, 2)]
+    points = np.concatenate([path for item in lines for path in item.paths])
+    assert points.min() >= 0
+    assert (points <= (plan.width, plan.height)).all()
+
+
 def test_ticks_and_dashes():
     assert ticks(-0.9, 2.1, 4) == [0.0, 1.0, 2.0]
     assert [piece[:, 0].tolist() for piece in dashes(np.array([[0.0, 0], [10, 0]]), (4, 2))] == [
@@ -409,6 +420,7 @@ NO_EXTENT = "has no extent, expected x0,z0,x1,z1 with x0 < x1 and z0 < z1"
         ({"limit_deg": 0.0}, "--limit-deg is 0, expected a number above 0"),
         ({"step": -1.0}, "--step is -1, expected a number above 0"),
         ({"step": math.nan}, "--step is nan, expected a number above 0"),
+        ({"height": math.nan}, "--height is nan, expected metres"),
         ({"minimise": "p95"}, "--minimise is 'p95', expected one of mean, worst"),
         (
             {"eye": None},
@@ -435,8 +447,7 @@ NO_EXTENT = "has no extent, expected x0,z0,x1,z1 with x0 < x1 and z0 < z1"
         ),
         (
             {"content": Content("depth", -9.0)},
-            "no facet shows content 9 m before the facets to the eye at 0,1.6,4:"
-            " it lies beside or behind that",
+            "content 9 m before the facets is beside or behind the eye at 0,1.6,4: no facet shows it",
         ),
     ],
 )

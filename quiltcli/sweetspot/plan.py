@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import FloatArray, normalized
+from quiltcli.geometry import FloatArray, dot, normalized
 from quiltcli.layout.drawing import FAINT, INK, PAGE_EDGE, PAPER, Label, Shape
 from quiltcli.sweetspot.distortion import MEASURES
 from quiltcli.sweetspot.floor import DIRECTIONS, contour, directions
@@ -74,24 +73,25 @@ class _Frame:
 
 def draw_plan(spot: SweetSpot, measure: str = "p95") -> Plan:
     """The map of one measure with the display, the eye, the limit's contour and a legend."""
-    frame = _frame(spot)
+    content = _content(spot)
+    frame = _frame(spot, content)
     width, height = (int(side) for side in frame.size)
-    content = _content(spot, frame)
     items: list[Item] = [*_header(spot, measure)]
     items += _grid(frame)
     items += _heat(spot, measure, frame)
     items += _display(spot, frame)
-    items.append(content)
+    items.append(Lines(tuple(map(frame.at, content)), CONTENT, 2, _DASH))
     items += _people(spot, frame)
     items += _rooms(spot, measure, frame)
-    items += _legend(spot, measure, _LEFT + width + 36, bool(content.paths))
+    items += _legend(spot, measure, _LEFT + width + 36, bool(content))
     return Plan(_LEFT + width + _SIDE, max(_TOP + height + _BOTTOM, 620), tuple(items))
 
 
-def _frame(spot: SweetSpot) -> _Frame:
-    """Room for the map, the display, the eyes and the audience."""
+def _frame(spot: SweetSpot, content: list[FloatArray]) -> _Frame:
+    """Room for the map, the display, the content, the eyes and the audience."""
     x0, z0, x1, z1 = spot.floor.area
     spots = [np.array([[x0, z0], [x1, z1]]), spot.display.corners[:, [0, 2]], spot.shown.eye[None, [0, 2]]]
+    spots += content
     if spot.audience is not None:
         spots.append(np.array(spot.audience).reshape(2, 2))
     every = np.concatenate(spots)
@@ -154,32 +154,46 @@ def _display(spot: SweetSpot, frame: _Frame) -> Iterator[Item]:
     thick = facets.count <= _FEW
     for lit in (False, True):
         mine = [facet for facet in range(facets.count) if (facet in shown) == lit]
-        paths = tuple(frame.at(_closed(facets.polygon(facet))) for facet in mine)
+        paths = tuple(frame.at(_outline(facets.polygon(facet))) for facet in mine)
         if thick:
             yield Lines(paths, PAPER, 7)
         yield Lines(paths, INK if lit else "#6b7483", 4 if thick else 1)
+
+
+def _outline(polygon: FloatArray) -> FloatArray:
+    """A facet from above: its closed polygon in x and z, or of an upright wall the line it is, once."""
+    flat = polygon[:, [0, 2]]
+    first = flat[0] - flat.mean(axis=0)
+    along = flat @ first
+    aside = (flat - flat[0]) @ np.array([-first[1], first[0]])
+    if np.abs(aside).max() <= 1e-9 * max(float(np.ptp(along)), 1e-12):
+        return flat[[int(along.argmin()), int(along.argmax())]]
+    return _closed(flat)
 
 
 def _closed(polygon: FloatArray) -> FloatArray:
     return np.concatenate((polygon, polygon[:1]))
 
 
-def _content(spot: SweetSpot, frame: _Frame) -> Lines:
-    """Where the content is, if it can be drawn: a plane that faces the eye, planes behind few facets."""
+def _content(spot: SweetSpot) -> list[FloatArray]:
+    """Where the content is, lines in x and z: a plane that faces the eye, or planes behind few facets.
+
+    Empty if it cannot be drawn, or is farther from the facets than the display is large.
+    """
     facets, eye, content = spot.display, spot.shown.eye, spot.content
     shown = np.unique(spot.shown.samples.facet[spot.shown.shown]).tolist()
-    paths: list[FloatArray] = []
+    size = float(np.ptp(facets.corners, axis=0).max())
     if content.kind == "plane":
         point = np.array(content.point)
         ahead = normalized((point - eye) * (1, 0, 1))
-        reach = 0.35 * float(np.ptp(facets.corners, axis=0).max())
-        ends = np.outer((-reach, reach), (-ahead[2], ahead[0]))
-        paths += [frame.at(point[[0, 2]] + ends)] if ahead.any() else []
-    elif content.kind == "depth" and 0 < abs(content.metres) < math.inf and len(shown) <= _FEW:
-        for facet in shown:
-            normal = facets.normal[facet] * np.sign((eye - facets.origin[facet]) @ facets.normal[facet])
-            paths.append(frame.at(_closed(facets.polygon(facet) - content.metres * normal)))
-    return Lines(tuple(path for path in paths if _inside(path, frame)), CONTENT, 2, _DASH)
+        near = np.linalg.norm(np.clip(point, facets.corners.min(axis=0), facets.corners.max(axis=0)) - point)
+        ends = np.outer((-0.35 * size, 0.35 * size), (-ahead[2], ahead[0]))
+        return [point[[0, 2]] + ends] if ahead.any() and near <= size else []
+    if content.kind == "distance" or not 0 < abs(content.metres) <= size or len(shown) > _FEW:
+        return []
+    side = np.sign(dot(eye - facets.origin, facets.normal))
+    behind = -content.metres * side[:, None] * facets.normal
+    return [_outline(facets.polygon(facet) + behind[facet]) for facet in shown]
 
 
 def _inside(path: FloatArray, frame: _Frame) -> bool:
@@ -210,6 +224,8 @@ def _rooms(spot: SweetSpot, measure: str, frame: _Frame) -> Iterator[Item]:
             continue
         tip, across = centre + way * length, np.array([-way[1], way[0]])
         ends = np.stack((tip - 7 * across, tip + 7 * across))
+        if not _inside(ends, frame):
+            continue
         yield Lines((np.stack((centre, tip)), ends), PAPER, 1.6)
         x, y = tip + way * (15 + 22 * abs(way[0]))
         yield Label(x, y, 16, f"{reach.metres[name]:.2f} m", INK, "middle")

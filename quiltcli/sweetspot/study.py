@@ -176,6 +176,8 @@ def _checked_height(facets: Facets, asked: Question) -> float:
     for option, value in numbers.items():
         if value is not None and not 0 < value < math.inf:
             raise JobError(f"{option} is {value:g}, expected a number above 0")
+    if asked.height is not None and not math.isfinite(asked.height):
+        raise JobError(f"--height is {asked.height:g}, expected metres")
     if asked.minimise not in MINIMISED:
         raise JobError(f"--minimise is {asked.minimise!r}, expected one of {', '.join(MINIMISED)}")
     if not facets.enabled.any():
@@ -201,7 +203,7 @@ def _nothing(shown: Show, content: Content) -> str:
     """Why the eye sees nothing."""
     eye = ",".join(f"{value:g}" for value in shown.eye)
     if lit_points(shown.samples, shown.eye).any():
-        return f"no facet shows content {content} to the eye at {eye}: it lies beside or behind that"
+        return f"content {content} is beside or behind the eye at {eye}: no facet shows it"
     return f"no facet is lit towards the eye at {eye}"
 
 
