@@ -1,0 +1,57 @@
+"""The `quilt` command itself, and the one place that turns an error into a message and an exit code."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from quiltcli import __version__
+from quiltcli.errors import QuiltError
+
+
+class Quilt(click.Group):
+    """The `quilt` command."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; errors that are the user's to mend become one line a problem."""
+        try:
+            return super().invoke(ctx)
+        except QuiltError as error:
+            if ctx.params.get("debug"):
+                raise
+            click.echo(f"error: {error}" if len(error.problems) == 1 else str(error), err=True)
+            ctx.exit(error.exit_code)
+        except KeyboardInterrupt:
+            ctx.exit(130)
+        except MemoryError:
+            if ctx.params.get("debug"):
+                raise
+            click.echo("error: not enough memory (smaller pages or fewer threads need less)", err=True)
+            ctx.exit(1)
+        except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
+            raise
+        except Exception as error:
+            if ctx.params.get("debug"):
+                raise
+            click.echo(f"error: {_unexpected(error)}", err=True)
+            ctx.exit(1)
+
+
+def _unexpected(error: Exception) -> str:
+    """What is said of an error that is no user's fault, and that nobody thought of."""
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"quilt has met a fault of its own: {what} (quilt --debug COMMAND … shows where)"
+
+
+@click.group(
+    cls=Quilt, context_settings={"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "QUILT"}
+)
+@click.version_option(__version__, prog_name="quilt")
+@click.option("--debug", is_flag=True, help="Show tracebacks.")
+def main(debug: bool) -> None:
+    """Render perspectively correct 3D for multiplanar displays.
+
+    A display is a set of flat facets; a quilt is the packed image of them all. (No patch stack, and
+    no Looking Glass grid of views.) The same program answers to quiltcli.
+    """

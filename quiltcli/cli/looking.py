@@ -1,0 +1,139 @@
+"""Commands to look and judge by: simulate, preview, sweetspot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from quiltcli.cli.group import main
+from quiltcli.cli.options import AREA, FRAMES, PATH, POINT, SIZE, VIEW
+from quiltcli.cli.printing import print_aligned
+
+
+@main.command()
+@click.argument("job", type=PATH)
+@click.option("-f", "--frames", type=FRAMES, help="Frames such as 7 or 1-12; the job's first by default.")
+@click.option(
+    "-o", "--output", type=PATH, required=True, help="PNG to write; #### in its name is the frame number."
+)
+@click.option("--size", type=SIZE, default="1200x900", show_default=True, help="Size of the picture.")
+@click.option("--from", "place", type=POINT, metavar="X,Y,Z", help="Look from here; from the eye by default.")
+@click.option("--look-at", type=POINT, metavar="X,Y,Z", help="Look there; at the display by default.")
+@click.option("--fov", type=click.FloatRange(0, 170, min_open=True), help="Degrees from top to bottom.")
+@click.option("--filter", type=click.Choice(("nearest", "linear")), default="linear", show_default=True)
+@click.option(
+    "--supersample", type=click.IntRange(1, 16), default=2, show_default=True, help="Rays across a pixel."
+)
+@click.option("--compare/--no-compare", default=True, help="From the eye, compare with a direct picture.")
+@click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
+@click.option("--direct", type=PATH, help="Write the direct picture, as PNG.")
+@click.option("--heat-map", type=PATH, help="Write a picture of the errors, as PNG.")
+@click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")
+@click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
+@click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
+@click.option(
+    "--set", "sets", metavar="KEY=VALUE", multiple=True, help="Set a value of the job, by dotted path."
+)
+def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], **how: Any) -> None:
+    """Light the display of JOB with its images and look at it.
+
+    From the viewer's eye the picture is compared with a direct one of the scene; the figures go to
+    stdout. The images are those that a render has left; where there are none they are drawn in memory.
+    """
+    from quiltcli.job import load_job
+    from quiltcli.simulate import PictureOptions
+    from quiltcli.simulate.files import Pictures, write_pictures
+
+    pictures = Pictures(
+        how.pop("output"), how.pop("direct"), how.pop("heat_map"), how.pop("view"), how.pop("exposure")
+    )
+    if how["size"] is None:
+        raise click.UsageError("--size: a picture needs a width and a height")
+    options = PictureOptions(samples=how.pop("supersample"), threads=how.pop("threads") or 0, **how)
+    loaded = load_job(job, sets)
+    for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures):
+        click.echo(line)
+
+
+@main.command()
+@click.argument("images", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="PNG to write, or a folder for several.")
+@click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")
+@click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
+def preview(images: tuple[Path, ...], output: Path, view: str, exposure: float) -> None:
+    """Turn EXR IMAGES, quilts or facets, into PNGs to look at, at most 2048 pixels wide and high."""
+    from quiltcli.preview import preview as write_preview
+    from quiltcli.preview import preview_paths
+
+    for image, picture in preview_paths(images, output):
+        width, height = write_preview(image, picture, view, exposure)
+        click.echo(f"{picture}  {width}×{height}")
+
+
+@main.command()
+@click.argument("display", type=PATH)
+@click.option("--eye", type=POINT, metavar="X,Y,Z", help="The eye the content is drawn for.")
+@click.option("--job", type=PATH, help="Take the eye of this job …")
+@click.option("-f", "--frame", type=int, help="… at this frame; the job's first by default.")
+@click.option(
+    "--at", type=POINT, metavar="X,Y,Z", help="Content on the plane through this point, facing the eye."
+)
+@click.option(
+    "--depth", type=float, help="Content this far behind the facets, metres; negative: before them."
+)
+@click.option("--distance", type=float, help="Content so far from the eye, metres; inf is far away.")
+@click.option("--area", type=AREA, metavar="X0,Z0,X1,Z1", help="Floor to map; around the eye by default.")
+@click.option("--height", type=float, help="Height of the eyes on the floor; the eye's by default.")
+@click.option("--step", type=float, help="Metres between places of the map.")
+@click.option("--limit-deg", type=float, default=2.0, show_default=True, help="Distortion that is borne.")
+@click.option("--audience", type=AREA, metavar="X0,Z0,X1,Z1", help="Find the eye that serves this area best.")
+@click.option("--minimise", type=click.Choice(("mean", "worst")), default="mean", show_default=True)
+@click.option("--samples", type=click.IntRange(min=1), default=2000, help="Points on the facets, about.")
+@click.option("--picture", type=PATH, help="Draw the map, as .png or .svg.")
+@click.option(
+    "--measure",
+    type=click.Choice(("mean", "p95", "worst")),
+    default="p95",
+    show_default=True,
+    help="What the picture shows.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Everything, for programs.")
+def sweetspot(
+    display: Path, job: Path | None, frame: int | None, picture: Path | None, measure: str, **how: Any
+) -> None:
+    """How far may a person stand from the eye the content of DISPLAY is drawn for?
+
+    For every place on the floor: the angle by which things are seen beside their right places, as mean,
+    95 % and worst over the facets; and the room there is under a limit.
+    """
+    from quiltcli.sweetspot import ask, sweet_spot
+    from quiltcli.sweetspot.picture import check_picture, sweet_spot_picture
+
+    as_json = how.pop("as_json")
+    if picture is not None:
+        check_picture(picture)
+    facets, question = ask(display, job, frame, **how)
+    spot = sweet_spot(facets, question)
+    if picture is not None:
+        sweet_spot_picture(spot, picture, measure)
+    _print_sweet_spot(spot, as_json)
+
+
+def _print_sweet_spot(spot: Any, as_json: bool) -> None:
+    """The answer as data, or in words and tables."""
+    from quiltcli.sweetspot import report
+
+    if as_json:
+        import json
+
+        click.echo(json.dumps(report.as_data(spot), indent=1, ensure_ascii=False, allow_nan=False))
+        return
+    for label, text in report.lines(spot):
+        click.echo(f"{label:<9}{text}")
+    click.echo()
+    print_aligned(report.reach_columns(spot), report.reach_rows(spot))
+    if rows := report.audience_rows(spot):
+        click.echo()
+        print_aligned(report.AUDIENCE_COLUMNS, rows)

@@ -1,0 +1,79 @@
+"""Values of options that the library reads from text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from quiltcli.errors import JobError
+
+PATH = click.Path(path_type=Path)
+
+
+class Parsed(click.ParamType):  # type: ignore[type-arg] # generic only in some versions of click
+    """A value that a function of the library reads from text."""
+
+    def __init__(self, name: str, read: Callable[[str], Any]) -> None:
+        self.name = name
+        self.read = read
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The value, or a usage error with the library's own words."""
+        if not isinstance(value, str):
+            return value
+        try:
+            return self.read(value)
+        except ValueError as error:
+            return self.fail(str(error), param, ctx)
+
+
+def _frames(text: str) -> tuple[int, ...]:
+    from quiltcli.frames import parse_frames
+
+    return parse_frames(text)
+
+
+def _facets(text: str) -> tuple[int, ...]:
+    from quiltcli.frames import parse_facets
+
+    return parse_facets(text)
+
+
+def _size(text: str) -> tuple[int, int] | None:
+    if text == "auto":
+        return None
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdigit() and height.isdigit() and int(width) and int(height)):
+        raise JobError(f"expected WIDTHxHEIGHT in pixels, such as 8192x8192, or auto, got {text!r}")
+    return int(width), int(height)
+
+
+def _point(text: str) -> tuple[float, ...]:
+    try:
+        point = tuple(map(float, text.split(",")))
+    except ValueError:
+        point = ()
+    if len(point) != 3 or not all(abs(value) < float("inf") for value in point):
+        raise JobError(f"expected a point in metres, such as 0,1.6,2.5, got {text!r}")
+    return point
+
+
+def _area(text: str) -> tuple[float, ...]:
+    try:
+        area = tuple(map(float, text.split(",")))
+    except ValueError:
+        area = ()
+    if len(area) != 4 or not all(abs(value) < float("inf") for value in area):
+        raise JobError(f"expected an area x0,z0,x1,z1 in metres, such as -2,1,2,4, got {text!r}")
+    return area
+
+
+FRAMES = Parsed("frames", _frames)
+FACETS = Parsed("facets", _facets)
+SIZE = Parsed("size", _size)
+POINT = Parsed("point", _point)
+AREA = Parsed("area", _area)
+VIEW = click.Choice(("aces", "srgb"))
