@@ -49,7 +49,9 @@ def pack(
 @main.command()
 @click.argument("layout", type=PATH)
 @click.option("-o", "--output", type=PATH, required=True, help="File to write; its suffix says the format.")
-@click.option("--format", "format_name", help="obj, csv, json, mpcdi, st, png or svg, whatever the suffix.")
+@click.option(
+    "--format", "format_name", help="obj, csv, json, mpcdi, mpcdi1, st, png or svg, whatever the suffix."
+)
 @click.option("--display", type=PATH, help="Display file, instead of the one the layout names.")
 def export(layout: Path, output: Path, format_name: str | None, display: Path | None) -> None:
     """Write LAYOUT as a pixel map other tools read.
