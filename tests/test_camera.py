@@ -10,7 +10,7 @@ from quiltcli.errors import ViewerError
 from quiltcli.geometry import polygon_normal
 from quiltcli.homography import eye_from_quilt
 from quiltcli.layout import check_layout, pixel_owners
-from quiltcli.simulate.camera import aimed, camera_display, frame_display
+from quiltcli.camera import aimed, camera_display, frame_display
 from quiltcli.viewer import Viewer
 
 

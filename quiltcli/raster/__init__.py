@@ -14,11 +14,13 @@ import numpy as np
 
 from quiltcli.geometry import OwnerArray
 from quiltcli.homography import QuiltRays
+from quiltcli.orders import DepthOrder
 from quiltcli.raster.blocks import Blocks, cut_batches, cut_blocks, new_canvas, ray_matrices
 from quiltcli.raster.depth import DepthRange, triangles_in_range
 from quiltcli.raster.hits import Hits
 from quiltcli.raster.keys import serial_bits
 from quiltcli.raster.large import draw_large
+from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.prewarp import BlockPairs, Sight, block_matrices, make_planes, split_pairs
 from quiltcli.raster.small import LIMIT, draw_small
 from quiltcli.raster.visibility import read_canvas
@@ -48,6 +50,7 @@ class Frame:
         blocks: the blocks of the layout.
         pairs: triangles by block.
         owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
+        order: the depth buffer that decides what is nearest; None for exact depth.
     """
 
     viewer: Viewer
@@ -56,6 +59,7 @@ class Frame:
     blocks: Blocks
     pairs: BlockPairs
     owners: OwnerArray
+    order: DepthOrder | None = None
 
 
 def batches(frame: Frame) -> list[tuple[int, int]]:
@@ -83,12 +87,13 @@ def rasterize(
     rays = ray_matrices(frame.rays.eye_from_quilt, frame.blocks, block, sample)
     viewer = frame.viewer
     limits = DepthRange(viewer.near, viewer.far, viewer.depth == "radial", viewer.look, rays)
+    by = None if frame.order is None else BatchOrder(frame.order, limits, frame.blocks.facet[block])
     matrices = block_matrices(frame.rays, frame.blocks, block, sample)
     chunks = make_planes(frame.sight, frame.pairs, frame.blocks, block, matrices)
     for planes in chunks:
         width = planes.box[1] - planes.box[0]
         height = planes.box[3] - planes.box[2]
         small = np.maximum(width, height) < LIMIT
-        draw_small(planes.take(np.flatnonzero(small)), canvas, limits, bits)
-        draw_large(planes.take(np.flatnonzero(~small)), canvas, limits, bits)
+        draw_small(planes.take(np.flatnonzero(small)), canvas, limits, bits, by)
+        draw_large(planes.take(np.flatnonzero(~small)), canvas, limits, bits, by)
     yield from read_canvas(canvas, chunks, frame.blocks, rays, frame.owners, bits)

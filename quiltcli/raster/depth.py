@@ -33,6 +33,13 @@ class DepthRange:
     look: FloatArray
     rays: FloatArray
 
+    def directions(
+        self, block: Int32Array, x: FloatArray | IntArray, y: FloatArray | IntArray
+    ) -> list[FloatArray]:
+        """Eye rays by axis, of pixels given as for `keeps`."""
+        m = self.rays[block]
+        return [m[..., i, 0] * x + m[..., i, 1] * y + m[..., i, 2] for i in range(3)]
+
     def keeps(
         self, block: Int32Array, x: FloatArray | IntArray, y: FloatArray | IntArray, inverse: FloatArray
     ) -> BoolArray:
@@ -44,8 +51,7 @@ class DepthRange:
             y: pixel rows.
             inverse: 1/t of the fragments, positive.
         """
-        m = self.rays[block]
-        ray = [m[..., i, 0] * x + m[..., i, 1] * y + m[..., i, 2] for i in range(3)]
+        ray = self.directions(block, x, y)
         if self.radial:
             length = np.sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
         else:

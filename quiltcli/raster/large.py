@@ -16,6 +16,7 @@ from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
 from quiltcli.raster.blocks import SIDE, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.keys import make_keys, serial_part
+from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import Planes
 
 MICROTILE = 8
@@ -47,7 +48,9 @@ class Spans:
         return Spans(self.row[keep], self.x[keep], self.y[keep], self.crossed[keep])
 
 
-def draw_large(planes: Planes, canvas: Canvas, limits: DepthRange, bits: int) -> int:
+def draw_large(
+    planes: Planes, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None = None
+) -> int:
     """Draw pairs of any size; see `small.draw_small` for the arguments.
 
     Returns:
@@ -58,7 +61,9 @@ def draw_large(planes: Planes, canvas: Canvas, limits: DepthRange, bits: int) ->
     huge = np.maximum(width, height) >= TILE
     rows = np.flatnonzero(huge)
     tiles = _tile_spans(rows, planes.box[:, rows], TILE)
-    tiles = _hide(planes, _classify(planes, tiles, TILE), canvas, TILE)
+    tiles = _classify(planes, tiles, TILE)
+    if by is None:
+        tiles = _hide(planes, tiles, canvas, TILE)
     box = planes.box[:, tiles.row]
     box[0::2] = np.maximum(box[0::2], (tiles.x, tiles.y))
     box[1::2] = np.minimum(box[1::2], (tiles.x + TILE - 1, tiles.y + TILE - 1))
@@ -67,8 +72,10 @@ def draw_large(planes: Planes, canvas: Canvas, limits: DepthRange, bits: int) ->
         _tile_spans(tiles.row, box, MICROTILE),
         _tile_spans(rows, planes.box[:, rows], MICROTILE),
     )
-    spans = _hide(planes, _classify(planes, spans, MICROTILE), canvas, MICROTILE)
-    _draw_rounds(planes, spans, canvas, limits, bits)
+    spans = _classify(planes, spans, MICROTILE)
+    if by is None:
+        spans = _hide(planes, spans, canvas, MICROTILE)
+    _draw_rounds(planes, spans, canvas, limits, bits, by)
     return spans.row.size * 64
 
 
@@ -135,7 +142,9 @@ def _places(planes: Planes, spans: Spans, canvas: Canvas, size: int) -> IntArray
     return place
 
 
-def _draw_rounds(planes: Planes, spans: Spans, canvas: Canvas, limits: DepthRange, bits: int) -> None:
+def _draw_rounds(
+    planes: Planes, spans: Spans, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None
+) -> None:
     """Evaluate the microtiles' pixels, in rounds in which every microtile occurs once."""
     tile = _places(planes, spans, canvas, MICROTILE)
     order = np.argsort(tile, kind="stable")
@@ -149,12 +158,14 @@ def _draw_rounds(planes: Planes, spans: Spans, canvas: Canvas, limits: DepthRang
     for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
         for at in range(first, last, _ROUND):
             part = np.arange(at, min(at + _ROUND, last))
-            drawn = _tile_keys(planes, spans.take(part), limits, bits)
+            drawn = _tile_keys(planes, spans.take(part), limits, bits, by)
             place = tile[part]
             keys[place] = np.maximum(keys[place], drawn)
 
 
-def _tile_keys(planes: Planes, spans: Spans, limits: DepthRange, bits: int) -> IntArray:
+def _tile_keys(
+    planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None
+) -> IntArray:
     """Keys (S, 64) of microtiles that are all crossed by the same edges; negative where not covered."""
     row = spans.row
     inverse = _over_tile(planes.inverse, spans)
@@ -172,6 +183,8 @@ def _tile_keys(planes: Planes, spans: Spans, limits: DepthRange, bits: int) -> I
         np.negative(inverse, out=inverse, where=~kept & planes.cut[row, None])
     if inside is not None:
         np.negative(inverse, out=inverse, where=(inside < 0) & (inverse > 0))
+    if by is not None:
+        inverse = by.values(planes.block[row, None], spans.x[:, None] + _X, spans.y[:, None] + _Y, inverse)
     return make_keys(inverse, serial_part(planes.serial[row, None], bits), bits)
 
 

@@ -15,6 +15,7 @@ from quiltcli.geometry import FloatArray
 from quiltcli.raster.blocks import Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.keys import make_keys, serial_part
+from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import Planes
 
 SIZES = (1, 2, 3, 4, 6, 8, 12)
@@ -31,7 +32,9 @@ def size_classes(planes: Planes) -> NDArray[np.uint16]:
     return classes
 
 
-def draw_small(planes: Planes, canvas: Canvas, limits: DepthRange, bits: int) -> int:
+def draw_small(
+    planes: Planes, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None = None
+) -> int:
     """Draw pairs whose boxes are at most LIMIT pixels wide and high.
 
     Args:
@@ -39,6 +42,7 @@ def draw_small(planes: Planes, canvas: Canvas, limits: DepthRange, bits: int) ->
         canvas: its keys are raised to the nearest surface.
         limits: near and far, for pairs that reach beyond them.
         bits: bits of the serial in a key.
+        by: what to order by instead of 1/t.
 
     Returns:
         Number of candidate pixels that were evaluated.
@@ -53,7 +57,7 @@ def draw_small(planes: Planes, canvas: Canvas, limits: DepthRange, bits: int) ->
         height, width = SIZES[shape // len(SIZES)], SIZES[shape % len(SIZES)]
         candidates += (last - first) * width * height
         for part in _slices(first, last, _CANDIDATES // (width * height)):
-            _draw_boxes(planes, part, (height, width), canvas, limits if cut else None, bits)
+            _draw_boxes(planes, part, (height, width), canvas, limits if cut else None, bits, by)
     return candidates
 
 
@@ -64,7 +68,13 @@ def _slices(first: int, last: int, step: int) -> Iterator[slice]:
 
 
 def _draw_boxes(
-    planes: Planes, part: slice, shape: tuple[int, int], canvas: Canvas, limits: DepthRange | None, bits: int
+    planes: Planes,
+    part: slice,
+    shape: tuple[int, int],
+    canvas: Canvas,
+    limits: DepthRange | None,
+    bits: int,
+    by: BatchOrder | None,
 ) -> None:
     """Draw pairs whose boxes all have this (height, width)."""
     height, width = shape
@@ -84,6 +94,8 @@ def _draw_boxes(
     if limits is not None:
         covered &= limits.keeps(block, fx[None, :, :], fy[:, None, :], inverse)
     drawn = np.flatnonzero(covered)
+    if by is not None:
+        inverse = by.values(block, fx[None, :, :], fy[:, None, :], inverse)
     column = x + (x >> 3) * 56
     row = (y >> 3) * (across * 64) + (y & 7) * 8 + canvas.tile_start[block] * 64
     address = row[:, None, :] + column

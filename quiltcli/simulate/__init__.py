@@ -18,7 +18,7 @@ from quiltcli.errors import ViewerError, raise_all
 from quiltcli.geometry import Float32Array
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.preview import block_means
-from quiltcli.simulate.camera import aimed, camera_display, frame_display
+from quiltcli.camera import aimed, camera_display, frame_display
 from quiltcli.simulate.compare import Comparison, compare, figures, heat_map, heat_scale, seam_pixels
 from quiltcli.simulate.images import shown_images
 from quiltcli.simulate.lookup import Shown

@@ -13,7 +13,7 @@ import numpy as np
 
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import ViewerError
-from quiltcli.geometry import BoolArray, FloatArray, cross, dot, normalized
+from quiltcli.geometry import BoolArray, FloatArray, cross, dot, normalized, segments
 from quiltcli.layout import Layout
 from quiltcli.viewer import Viewer
 
@@ -125,6 +125,21 @@ def frame_display(viewer: Viewer, corners: FloatArray, aspect: float, turn: bool
         camera = viewer
         reach = widest / max(aspect, 1.0)
     return camera, math.degrees(2 * math.atan(reach))
+
+
+def viewer_frustum(viewer: Viewer, facets: Facets, lit: BoolArray) -> tuple[float, float]:
+    """Slopes from the look direction to the sides and to the top of the viewer's own image.
+
+    The frustum is symmetric about the look direction and as narrow as shows all lit facets, opened to
+    `WIDEST` at most: the virtual view plane (Harish & Narayanan, §3.1).
+    """
+    row, _ = segments(facets.corner_start)
+    x, y, ahead = _tangents(viewer, (facets.corners - viewer.eye)[lit[row]])
+    widest = math.tan(math.radians(WIDEST) / 2)
+    if not (ahead.size and ahead.all()):
+        return widest, widest
+    wide, high = (min(float(np.abs(slope).max()), widest) for slope in (x, y))
+    return max(wide, 1e-6), max(high, 1e-6)
 
 
 def _tangents(camera: Viewer, local: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
