@@ -43,7 +43,7 @@ def test_out_and_in_again(folder, name):
 
 
 def test_names_come_from_the_display_the_layout_names(folder):
-    quilt("pack", CUBE, "-o", "cube.yaml")
+    quilt("pack", CUBE, "-o", "cube.yaml", "--method", "rows")
     assert quilt("export", "cube.yaml", "-o", "m.obj") == ["m.obj"]
     assert "o facet_0005_top" in Path("m.obj").read_text().splitlines()
     assert quilt("import", "m.obj", "-o", "again.yaml", "--display", CUBE) == ["5 facets on 1 page"]
