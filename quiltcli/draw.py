@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from quiltcli.raster import (
     Frame,
     Sight,
     batches,
+    block_window,
     cut_blocks,
     rasterize,
     split_pairs,
@@ -41,6 +42,8 @@ from quiltcli.shading import MOST_HALF
 from quiltcli.viewer import Viewer
 
 Buffers = dict[str, NDArray[Any]]
+Runner: TypeAlias = Callable[[Frame, Sequence[tuple[int, int]], Buffers], int]
+"""Draws batches of a frame into buffers; returns how many pixels of facets show the scene."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,14 @@ def new_buffers(stage: Stage) -> Buffers:
 
 
 def draw_frame(
-    stage: Stage, viewer: Viewer, buffers: Buffers, threads: int = 1, only: BoolArray | None = None
+    stage: Stage,
+    viewer: Viewer,
+    buffers: Buffers,
+    threads: int = 1,
+    only: BoolArray | None = None,
+    *,
+    dirty: BoolArray | None = None,
+    run: Runner | None = None,
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet.
 
@@ -125,6 +135,8 @@ def draw_frame(
         buffers: from `new_buffers`; overwritten where facets are drawn, emptied elsewhere.
         threads: batches drawn at a time; the pixels do not depend on it.
         only: (F,) facets to draw; the pixels of all others are left as they are.
+        dirty: (F,) facets whose pixels may hold something; all, where it is not known.
+        run: draws the batches instead of threads.
 
     Returns:
         The frame's record.
@@ -146,11 +158,10 @@ def draw_frame(
         block_pairs = split_pairs(pairs, sight, rays, stage.blocks)
         frame = Frame(viewer, sight, rays, stage.blocks, block_pairs, stage.owners)
     with clock.stage("clear"):
-        clear(stage, rays.lit, buffers, only)
+        clear(stage, buffers, only, dirty)
+        lay_background(stage, rays.lit, buffers)
     with clock.stage("rasterize and shade"):
-        work = batches(frame)
-        with ThreadPoolExecutor(threads) as pool:
-            visible = sum(pool.map(lambda batch: draw_batch(stage, frame, batch, buffers), work))
+        visible = (run or in_threads(stage, threads))(frame, batches(frame), buffers)
     return FrameRecord(
         frame=viewer.frame,
         triangles=int(np.count_nonzero(wanted)),
@@ -172,17 +183,44 @@ def faces_eye(scene: Scene, eye: FloatArray) -> BoolArray:
     return result
 
 
-def clear(stage: Stage, lit: BoolArray, buffers: Buffers, only: BoolArray | None) -> None:
-    """Empty the buffers, or the pixels of the facets in `only`; lit facets get the background's colour."""
-    mine: Any = slice(None)
+def in_threads(stage: Stage, threads: int) -> Runner:
+    """Draws batches in threads of this process."""
+
+    def run(frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers) -> int:
+        with ThreadPoolExecutor(threads) as pool:
+            return sum(pool.map(lambda batch: draw_batch(stage, frame, batch, buffers), work))
+
+    return run
+
+
+def clear(stage: Stage, buffers: Buffers, only: BoolArray | None, dirty: BoolArray | None) -> None:
+    """Empty the pixels of the facets in `only`, or of all that are `dirty`, or everything."""
+    empty = {name: value for name, (_, value) in exr_channels(stage.job.output.channels).items()}
     if only is not None:
         mine = np.concatenate(([False], only))[np.abs(stage.owners)]
-    for name, (_, empty) in exr_channels(stage.job.output.channels).items():
-        buffers[name][mine] = empty
-    if "rgba" in stage.job.output.channels and stage.scene.background.any():
-        shown = np.concatenate(([False], lit))[np.abs(stage.owners)]
-        for name, value in zip("RGB", stage.scene.background, strict=True):
-            buffers[name][shown] = value
+        for name, value in empty.items():
+            buffers[name][mine] = value
+    elif dirty is None:
+        for name, value in empty.items():
+            buffers[name].fill(value)
+    else:
+        for block in np.flatnonzero(dirty[stage.blocks.facet]).tolist():
+            for name, value in empty.items():
+                block_window(buffers[name], stage.blocks, block).fill(value)
+
+
+def lay_background(stage: Stage, lit: BoolArray, buffers: Buffers) -> None:
+    """Give the pixels of lit facets the background's colour."""
+    color = stage.scene.background
+    if "rgba" not in stage.job.output.channels or not color.any():
+        return
+    for block in np.flatnonzero(lit[stage.blocks.facet]).tolist():
+        owner = block_window(stage.owners, stage.blocks, block)
+        facet = int(stage.blocks.facet[block]) + 1
+        mine = (owner == facet) | (owner == -facet)
+        for name, value in zip("RGB", color, strict=True):
+            pixels = block_window(buffers[name], stage.blocks, block)
+            np.copyto(pixels, value, where=mine, casting="same_kind")
 
 
 def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers) -> int:

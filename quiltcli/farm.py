@@ -21,12 +21,13 @@ from quiltcli.draw import Stage, default_threads, set_stage
 from quiltcli.errors import CheckFailedError, JobError, MissingExtraError, Problem, QuiltError, raise_all
 from quiltcli.interrupt import Stopped, stop_between_frames
 from quiltcli.job import JobFile, job_sha256, load_job
-from quiltcli.outputs import Outputs, frame_is_complete, outputs, refuse_to_overwrite, write_settings
+from quiltcli.outputs import frame_is_complete, outputs, write_settings
 from quiltcli.render import (
     Listener,
+    Prepared,
     RenderOptions,
-    check_eyes,
     chosen_facets,
+    prepare,
     render_frames,
     stage_warnings,
     viewer_path,
@@ -79,15 +80,16 @@ def render_on(
     listener = listener or Listener()
     folder = (options.folder or job.output.directory).absolute()
     options = replace(options, folder=folder)
-    stage, out, frames = _checked(job, options)
-    for notice in (*stage.scene.notices, *stage_warnings(stage)):
+    ready = prepare(job, options)
+    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
         listener.say(notice)
-    listener.begin(len(frames))
-    if options.dry_run or not frames:
+    listener.begin(len(ready.viewers))
+    if options.dry_run or not ready.viewers:
         return []
+    out = ready.out
     with _connected(distributed, address) as client:
-        write_settings(stage, out)
-        tasks = [Task(folder / "job.yaml", out.job_sha, frame, options) for frame in frames]
+        write_settings(ready.stage, out)
+        tasks = [Task(folder / "job.yaml", out.job_sha, viewer.frame, options) for viewer in ready.viewers]
         records = _collect(distributed, client, tasks, listener)
         if records:
             # Once more from here: workers on a file system without locks may have lost some.
@@ -102,21 +104,6 @@ def _distributed() -> Any:
         words = "--scheduler needs dask.distributed, which is not installed (pip install quiltcli[dist])"
         raise MissingExtraError(words) from None
     return distributed
-
-
-def _checked(job: JobFile, options: RenderOptions) -> tuple[Stage, Outputs, list[int]]:
-    """Find every problem here and now, as a render on one machine would; the frames left to draw."""
-    frames = list(job.frames if options.frames is None else options.frames)
-    viewers = viewer_path(job, frames)
-    stage = set_stage(job)
-    check_eyes(stage, viewers)
-    only = chosen_facets(stage, options.facets)
-    out = outputs(stage, options.folder or job.output.directory, job_sha256(job), options.facets)
-    if options.resume:
-        frames = [frame for frame in frames if not frame_is_complete(stage, out, frame)]
-    elif not options.overwrite and only is None:
-        refuse_to_overwrite(stage, out, frames)
-    return stage, out, frames
 
 
 @contextmanager
@@ -194,8 +181,8 @@ def render_task(task: Task) -> FrameRecord | None:
     out = outputs(stage, task.job_file.parent, task.job_sha, options.facets)
     if not options.overwrite and only is None and frame_is_complete(stage, out, task.frame):
         return None
-    viewers = viewer_path(stage.job, [task.frame])
-    [record] = render_frames(stage, out, viewers, only, options.threads or default_threads(), Listener())
+    ready = Prepared(stage, out, tuple(viewer_path(stage.job, [task.frame])), only)
+    [record] = render_frames(ready, options.threads or default_threads(), Listener())
     return record
 
 

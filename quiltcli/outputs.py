@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.channels import exr_channels
 from quiltcli.draw import Buffers, Stage
-from quiltcli.errors import OutputError, Problem
+from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.exr import (
     facet_attributes,
     facet_path,
@@ -20,6 +19,7 @@ from quiltcli.exr import (
     is_complete,
     quilt_path,
     read_exr,
+    read_header,
     write_exr,
 )
 from quiltcli.geometry import IntArray, facet_from_world
@@ -131,24 +131,29 @@ def _write_facet(
     write_exr(path, pixels, attributes, stage.job.output.compression)
 
 
+def merge_problems(stage: Stage, out: Outputs, frames: Iterable[int]) -> list[Problem]:
+    """What keeps facets from being merged into the quilts of these frames."""
+    return [problem for frame in frames for _, problem in _pages_on_disk(stage, out, frame) if problem]
+
+
 def read_quilt(stage: Stage, out: Outputs, frame: int, buffers: Buffers) -> None:
     """Fill `buffers` with the quilt that is on disk, for facets to be merged into.
 
     Raises:
-        OutputError: a page is missing, of another size, has other channels, or another job's.
+        OutputError: a page is missing, damaged, of another size, has other channels, or another job's.
     """
-    for page, problem_or_none in _pages_on_disk(stage, out, frame, buffers):
-        if problem_or_none is not None:
-            raise OutputError(problem_or_none)
-        image = read_exr(quilt_path(out.folder, page + 1, frame))
+    raise_all(OutputError, merge_problems(stage, out, [frame]))
+    for page in range(len(stage.layout.pages)):
+        path = quilt_path(out.folder, page + 1, frame)
+        image = read_exr(path)
+        if missing := sorted(set(buffers) - set(image.channels)):
+            raise OutputError(Problem(f"lacks the channels {', '.join(missing)}", str(path)))
         for name in buffers:
             page_of(buffers[name], stage.layout, page)[:] = image.channels[name]
 
 
-def _pages_on_disk(
-    stage: Stage, out: Outputs, frame: int, buffers: Buffers
-) -> Iterator[tuple[int, Problem | None]]:
-    """Every page of the frame's quilt, with what is wrong with its file."""
+def _pages_on_disk(stage: Stage, out: Outputs, frame: int) -> Iterator[tuple[int, Problem | None]]:
+    """Every page of the frame's quilt, with what is wrong with its file; no pixel is read."""
     for page, (width, height) in enumerate(stage.layout.pages.tolist()):
         path = quilt_path(out.folder, page + 1, frame)
         if not path.exists():
@@ -157,20 +162,13 @@ def _pages_on_disk(
                 Problem("no such quilt to merge facets into (render the whole frame first)", str(path)),
             )
             continue
-        image = read_exr(path)
-        found = set(image.channels)
-        size = next(iter(image.channels.values())).shape
-        if found != set(exr_channels(stage.job.output.channels)):
-            yield page, Problem(f"has the channels {', '.join(sorted(found))}, the job has others", str(path))
-        elif size != (height, width):
-            yield (
-                page,
-                Problem(f"is {size[1]}×{size[0]} pixels, the layout's page is {width}×{height}", str(path)),
-            )
+        image = read_header(path)
+        size = tuple(np.subtract(image.display_window[1], image.display_window[0]) + 1)
+        if size != (width, height):
+            words = f"is {size[0]}×{size[1]} pixels, the layout's page is {width}×{height}"
+            yield page, Problem(words, str(path))
         elif image.attributes.get("quilt:job") != out.job_sha:
-            yield (
-                page,
-                Problem("was made by another job; facets can only be merged into the same job's", str(path)),
-            )
+            words = "was made by another job; facets can only be merged into the same job's"
+            yield page, Problem(words, str(path))
         else:
             yield page, None

@@ -8,7 +8,10 @@ frame → viewer                          a function of the frame number
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,21 +19,24 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.display import pitch_mm
-from quiltcli.draw import Stage, default_threads, draw_frame, new_buffers, set_stage
-from quiltcli.errors import JobError, Problem, ViewerError, raise_all
-from quiltcli.geometry import BoolArray, dot
+from quiltcli.display import lit_facets, pitch_mm
+from quiltcli.draw import Buffers, Stage, default_threads, draw_frame, new_buffers, set_stage
+from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, raise_all
+from quiltcli.eyes import eye_problems
+from quiltcli.geometry import BoolArray
 from quiltcli.interrupt import stop_between_frames
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.outputs import (
     Outputs,
     frame_is_complete,
+    merge_problems,
     outputs,
     read_quilt,
     refuse_to_overwrite,
     write_frame,
     write_settings,
 )
+from quiltcli.pool import Pool, can_fork, shared_buffers
 from quiltcli.report import FrameRecord, write_report
 from quiltcli.viewer import Viewer, check_viewer, viewer_at
 
@@ -73,6 +79,23 @@ class Listener:
     say: Callable[[str], None] = lambda sentence: None
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """A job with every problem found and nothing written yet.
+
+    Attributes:
+        stage: what the frames share.
+        out: where the files go.
+        viewers: the viewers of the frames that are left to draw.
+        only: (F,) the only facets to draw, None for all.
+    """
+
+    stage: Stage
+    out: Outputs
+    viewers: tuple[Viewer, ...]
+    only: BoolArray | None
+
+
 def render(
     job: JobFile, options: RenderOptions | None = None, listener: Listener | None = None
 ) -> list[FrameRecord]:
@@ -91,50 +114,104 @@ def render(
         Stopped: a signal came; the frames rendered so far are whole and reported.
     """
     options, listener = options or RenderOptions(), listener or Listener()
+    ready = prepare(job, options)
+    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
+        listener.say(notice)
+    if options.dry_run or not ready.viewers:
+        return []
+    write_settings(ready.stage, ready.out)
+    return render_frames(ready, options.threads or default_threads(), listener)
+
+
+def prepare(job: JobFile, options: RenderOptions) -> Prepared:
+    """Load what a job names, and find every reason not to render it.
+
+    Raises:
+        QuiltError: bad input, or files that are in the way.
+    """
     frames = list(job.frames if options.frames is None else options.frames)
     viewers = viewer_path(job, frames)
     stage = set_stage(job)
-    check_eyes(stage, viewers)
+    raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
     only = chosen_facets(stage, options.facets)
     out = outputs(stage, options.folder or job.output.directory, job_sha256(job), options.facets)
-    viewers = [
-        viewer for viewer in viewers if not (options.resume and frame_is_complete(stage, out, viewer.frame))
-    ]
-    if not (options.resume or options.overwrite or only is not None):
+    if only is not None:
+        raise_all(OutputError, merge_problems(stage, out, frames))
+    elif options.resume:
+        viewers = [viewer for viewer in viewers if not frame_is_complete(stage, out, viewer.frame)]
+    elif not options.overwrite:
         refuse_to_overwrite(stage, out, frames)
-    for notice in (*stage.scene.notices, *stage_warnings(stage)):
-        listener.say(notice)
-    listener.begin(len(viewers))
-    if options.dry_run or not viewers:
-        return []
-    write_settings(stage, out)
-    return render_frames(stage, out, viewers, only, options.threads or default_threads(), listener)
+    return Prepared(stage, out, tuple(viewers), only)
 
 
-def render_frames(
-    stage: Stage,
-    out: Outputs,
-    viewers: Sequence[Viewer],
-    only: BoolArray | None,
-    threads: int,
-    listener: Listener,
-) -> list[FrameRecord]:
-    """Draw and write one frame after the other; a signal stops between two of them."""
-    buffers = new_buffers(stage)
-    records: list[FrameRecord] = []
-    report = out.folder / "report.json"
-    with stop_between_frames() as request:
-        for viewer in viewers:
+def render_frames(ready: Prepared, threads: int, listener: Listener) -> list[FrameRecord]:
+    """Draw and write the frames; while one is written, the next is drawn into other buffers."""
+    stage, viewers = ready.stage, ready.viewers
+    pooled = threads > 1 and can_fork()
+    sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in viewers[:2]]
+    # Forked before this process has threads of its own: a lock that one holds would stay locked.
+    with ExitStack() as ends:
+        pool = ends.enter_context(Pool(stage, sheets, threads)) if pooled else None
+        listener.begin(len(viewers))
+        request = ends.enter_context(stop_between_frames())
+        writer = ends.enter_context(Writer(ready, threads, listener))
+        dirty = [np.zeros(stage.facets.count, dtype=np.bool_) for _ in sheets]
+        for number, viewer in enumerate(viewers):
             request.check()
-            if only is not None:
-                read_quilt(stage, out, viewer.frame, buffers)
-            record = draw_frame(stage, viewer, buffers, threads, only)
-            record = record.timed("write", partial(write_frame, stage, out, viewer, buffers, threads))
-            records.append(record)
-            write_report(report, out.job_sha, __version__, [record])
-            listener.frame_done(record)
+            turn = number % len(sheets)
+            writer.leave(len(sheets) - 1)
+            if ready.only is not None:
+                read_quilt(stage, ready.out, viewer.frame, sheets[turn])
+            run = pool.draw if pool else None
+            record = draw_frame(stage, viewer, sheets[turn], threads, ready.only, dirty=dirty[turn], run=run)
+            dirty[turn] = lit_facets(stage.facets, viewer.eye)
+            writer.take(record, viewer, sheets[turn])
+        writer.leave(0)
         request.check()
-    return records
+    return writer.records
+
+
+class Writer:
+    """Writes frames behind the drawing, in order; a context manager that leaves no frame unwritten.
+
+    Attributes:
+        records: of the frames whose files are all there.
+    """
+
+    def __init__(self, ready: Prepared, threads: int, listener: Listener) -> None:
+        self.records: list[FrameRecord] = []
+        self._ready = ready
+        self._threads = threads
+        self._listener = listener
+        self._executor = ThreadPoolExecutor(1)
+        self._waiting: deque[Future[FrameRecord]] = deque()
+
+    def __enter__(self) -> Writer:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        try:
+            while self._waiting:
+                # After a first error the frames behind it are still finished; it is the one that is told.
+                with suppress(*(QuiltError,) if kind else ()):
+                    self.leave(len(self._waiting) - 1)
+        finally:
+            self._executor.shutdown()
+
+    def take(self, record: FrameRecord, viewer: Viewer, buffers: Buffers) -> None:
+        """Write a frame; its buffers must not change until `leave` has let it go."""
+        stage, out = self._ready.stage, self._ready.out
+        work = partial(write_frame, stage, out, viewer, buffers, self._threads)
+        self._waiting.append(self._executor.submit(record.timed, "write", work))
+
+    def leave(self, count: int) -> None:
+        """Wait until at most `count` frames are unwritten; report those that are."""
+        while len(self._waiting) > count:
+            record = self._waiting.popleft().result()
+            self.records.append(record)
+            out = self._ready.out
+            write_report(out.folder / "report.json", out.job_sha, __version__, [record])
+            self._listener.frame_done(record)
 
 
 def viewer_path(job: JobFile, frames: Sequence[int]) -> list[Viewer]:
@@ -145,30 +222,6 @@ def viewer_path(job: JobFile, frames: Sequence[int]) -> list[Viewer]:
     """
     raise_all(ViewerError, check_viewer(job.viewer, frames))
     return [viewer_at(job.viewer, frame, job.render.depth) for frame in frames]
-
-
-def check_eyes(stage: Stage, viewers: Sequence[Viewer]) -> None:
-    """Raise ViewerError where the eye lies in the plane of a facet, whose image would be a line."""
-    facets = stage.facets
-    problems = []
-    for viewer in viewers:
-        height = dot(viewer.eye - facets.origin, facets.normal)
-        flat = np.flatnonzero(facets.enabled & (np.abs(height) <= 1e-9))
-        if flat.size:
-            problems.append(_edge_on(stage, viewer, flat.tolist()))
-    raise_all(ViewerError, problems[:20])
-
-
-def _edge_on(stage: Stage, viewer: Viewer, flat: list[int]) -> Problem:
-    """The problem of an eye that sees some facets edge-on."""
-    name = stage.facets.names[flat[0]]
-    which = f"facet {flat[0] + 1}" + (f" ({name})" if name else "")
-    which += f" and of {len(flat) - 1} more" if len(flat) > 1 else ""
-    message = (
-        f"at frame {viewer.frame} the eye lies in the plane of {which}, which would be a line to it"
-        " (move the path by a millimetre)"
-    )
-    return stage.job.viewer.source.problem(("path",), message)
 
 
 def chosen_facets(stage: Stage, ids: Sequence[int] | None) -> BoolArray | None:

@@ -322,10 +322,10 @@ SLOW = """
 import sys, time
 import quiltcli.render as render
 draw = render.draw_frame
-def slow(stage, viewer, *rest):
+def slow(stage, viewer, *rest, **how):
     print("drawing", viewer.frame, flush=True)
     time.sleep(0.3)
-    return draw(stage, viewer, *rest)
+    return draw(stage, viewer, *rest, **how)
 render.draw_frame = slow
 from quiltcli.cli import main
 main.main(["render", "job.yaml"], prog_name="quilt")

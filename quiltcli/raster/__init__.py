@@ -15,7 +15,7 @@ import numpy as np
 from quiltcli.geometry import OwnerArray
 from quiltcli.homography import QuiltRays
 from quiltcli.orders import DepthOrder
-from quiltcli.raster.blocks import Blocks, cut_batches, cut_blocks, new_canvas, ray_matrices
+from quiltcli.raster.blocks import Blocks, block_window, cut_batches, cut_blocks, new_canvas, ray_matrices
 from quiltcli.raster.depth import DepthRange, triangles_in_range
 from quiltcli.raster.hits import Hits
 from quiltcli.raster.keys import serial_bits
@@ -27,11 +27,13 @@ from quiltcli.raster.visibility import read_canvas
 from quiltcli.viewer import Viewer
 
 __all__ = [
+    "BlockPairs",
     "Blocks",
     "Frame",
     "Hits",
     "Sight",
     "batches",
+    "block_window",
     "cut_blocks",
     "rasterize",
     "split_pairs",

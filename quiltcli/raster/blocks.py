@@ -8,11 +8,15 @@ cache. Keys are kept in microtiles: 8 × 8 pixels that are 64 neighbours in memo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, OwnerArray, segments
 from quiltcli.layout import Layout, quilt_polygons
+
+T = TypeVar("T", bound=np.generic)
 
 SIDE = 512
 BATCH_PIXELS = 1 << 20
@@ -103,6 +107,18 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
     )
 
 
+def window(flat: NDArray[T], address: int, stride: int, width: int, height: int) -> NDArray[T]:
+    """A rectangle of a flat page as a view (height, width)."""
+    steps = (int(stride) * flat.itemsize, flat.itemsize)
+    return np.lib.stride_tricks.as_strided(flat[address:], (height, width), steps)
+
+
+def block_window(flat: NDArray[T], blocks: Blocks, block: int) -> NDArray[T]:
+    """The pixels of one block in a flat buffer, as a view (height, width)."""
+    rectangle = (a[block] for a in (blocks.address, blocks.stride, blocks.width, blocks.height))
+    return window(flat, *(int(number) for number in rectangle))
+
+
 def _interior_tiles(
     facet: IntArray,
     width: IntArray,
@@ -115,10 +131,7 @@ def _interior_tiles(
     found = []
     for f, w, h, first, step in zip(facet, width, height, address, stride, strict=True):
         mine = np.zeros((-(-h // 8) * 8, -(-w // 8) * 8), dtype=np.bool_)
-        window = np.lib.stride_tricks.as_strided(
-            owners[first:], (h, w), (step * owners.itemsize, owners.itemsize), writeable=False
-        )
-        np.equal(window, f + 1, out=mine[:h, :w])
+        np.equal(window(owners, first, step, w, h), f + 1, out=mine[:h, :w])
         found.append(mine.reshape(mine.shape[0] // 8, 8, -1, 8).all(axis=(1, 3)).ravel())
     return np.concatenate(found) if found else np.zeros(0, dtype=np.bool_)
 

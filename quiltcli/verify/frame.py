@@ -14,14 +14,16 @@ import numpy as np
 
 from quiltcli.display import lit_facets, shared_edges
 from quiltcli.draw import Stage, default_threads, set_stage
+from quiltcli.errors import ViewerError, raise_all
+from quiltcli.eyes import eye_problems
 from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.homography import quilt_rays
 from quiltcli.job import JobFile
-from quiltcli.render import check_eyes, viewer_path
+from quiltcli.rays.embree import aim
+from quiltcli.render import viewer_path
 from quiltcli.verify.arbiter import Neighbours
 from quiltcli.verify.images import Images, find_images
 from quiltcli.verify.pixels import Trial, check_pixels
-from quiltcli.verify.rays import aim
 from quiltcli.verify.sample import every_pixel, sampled_pixels
 from quiltcli.verify.seams import Seams, check_seams, seam_points
 from quiltcli.verify.tally import Fault, Tally
@@ -124,7 +126,7 @@ def verify(job: JobFile, options: VerifyOptions | None = None) -> tuple[Verdict,
     frame = job.frames[0] if options.frame is None else options.frame
     viewers = viewer_path(job, [frame])
     stage = set_stage(job)
-    check_eyes(stage, viewers)
+    raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
     threads = options.threads or default_threads()
     folder = options.folder or job.output.directory
     images = find_images(stage, viewers[0], folder, threads, options.redraw)

@@ -1,0 +1,234 @@
+"""Worker processes that draw the batches of a frame into shared memory.
+
+Threads gain little here: much of numpy holds the interpreter's lock. So the workers are forked once,
+with everything the frames share already in memory, and nothing of it is ever copied or sent. What
+changes from frame to frame is written into a shared arena, and pixels go straight into shared
+buffers: every pixel belongs to one batch, so nobody waits for anybody. Where processes cannot fork,
+`draw.draw_frame` draws in threads instead.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import mmap
+import multiprocessing
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quiltcli.channels import exr_channels
+from quiltcli.draw import Buffers, Stage, draw_batch
+from quiltcli.errors import CheckFailedError, Problem
+from quiltcli.geometry import BoolArray
+from quiltcli.homography import quilt_rays
+from quiltcli.raster import BlockPairs, Frame, Sight
+from quiltcli.viewer import Viewer
+
+_ROOM = 64  # pairs a triangle there is room for; memory that is not touched costs nothing
+_LEAST_ROOM = 1 << 26
+
+
+def can_fork() -> bool:
+    """Whether this system has processes that share their parent's memory."""
+    return sys.platform.startswith("linux") and "fork" in multiprocessing.get_all_start_methods()
+
+
+def shared_array(length: int, dtype: Any) -> NDArray[Any]:
+    """Zeros that forked processes write to together; freed with the last of them."""
+    dtype = np.dtype(dtype)
+    return np.frombuffer(mmap.mmap(-1, max(length * dtype.itemsize, 1)), dtype=dtype, count=length)
+
+
+def shared_buffers(stage: Stage) -> Buffers:
+    """As `draw.new_buffers`, in memory that workers share."""
+    buffers = {}
+    for name, (dtype, empty) in exr_channels(stage.job.output.channels).items():
+        buffers[name] = shared_array(stage.owners.size, dtype)
+        if empty:
+            buffers[name].fill(empty)
+    return buffers
+
+
+@dataclass(frozen=True)
+class _Arena:
+    """Where the arrays of the frame under way lie.
+
+    Attributes:
+        vertices: (V, 3) world minus eye.
+        cut: (T,) triangles cut by near or far.
+        start: (B+1,) offsets of the blocks' pairs.
+        triangle: (capacity,) their triangles.
+    """
+
+    vertices: NDArray[np.float64]
+    cut: BoolArray
+    start: NDArray[np.int64]
+    triangle: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What a worker is told of a frame.
+
+    Attributes:
+        viewer: the viewer.
+        lit: (F,) facets that are drawn.
+        pairs: number of block pairs.
+        buffers: which of the buffers to draw into.
+    """
+
+    viewer: Viewer
+    lit: BoolArray
+    pairs: int
+    buffers: int
+
+
+class Pool:
+    """Forked workers of one stage; a context manager that ends them."""
+
+    def __init__(self, stage: Stage, buffers: Sequence[Buffers], workers: int) -> None:
+        scene = stage.scene
+        triangles = len(scene.triangles)
+        self._stage = stage
+        self._buffers = buffers
+        self._arena = _Arena(
+            shared_array(scene.vertices.size, np.float64).reshape(-1, 3),
+            shared_array(triangles, np.bool_),
+            shared_array(len(stage.blocks.facet) + 1, np.int64),
+            shared_array(max(_ROOM * triangles, _LEAST_ROOM), np.int32),
+        )
+        _ = scene.corner_normals, scene.corner_colors  # made once, before there are copies of the process
+        context = multiprocessing.get_context("fork")
+        self._workers = []
+        for _number in range(workers):
+            ours, theirs = context.Pipe()
+            arguments = (theirs, stage, buffers, self._arena, os.getpid())
+            process = context.Process(target=_serve, args=arguments, daemon=True)
+            process.start()
+            theirs.close()
+            self._workers.append((process, ours))
+
+    def __enter__(self) -> Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the workers, whatever they are doing."""
+        for process, connection in self._workers:
+            with contextlib.suppress(OSError):
+                connection.close()
+            process.terminate()
+        for process, _ in self._workers:
+            process.join()
+        self._workers = []
+
+    def fits(self, frame: Frame) -> bool:
+        """Whether the arena has room for the frame's pairs."""
+        return bool(frame.pairs.triangle.size <= self._arena.triangle.size)
+
+    def draw(self, frame: Frame, batches: Sequence[tuple[int, int]], buffers: Buffers) -> int:
+        """Draw batches into one of the pool's buffers.
+
+        Returns:
+            How many pixels of facets show the scene.
+
+        Raises:
+            CheckFailedError: a worker died.
+        """
+        pairs = frame.pairs
+        self._arena.vertices[:] = frame.sight.vertices
+        self._arena.cut[:] = frame.sight.cut
+        self._arena.start[:] = pairs.start
+        self._arena.triangle[: pairs.triangle.size] = pairs.triangle
+        index = next(i for i, known in enumerate(self._buffers) if known is buffers)
+        task = _Task(frame.viewer, frame.rays.lit, pairs.triangle.size, index)
+        cost = [int(pairs.start[last] - pairs.start[first]) for first, last in batches]
+        waiting = [batches[i] for i in np.argsort(cost, kind="stable").tolist()]  # dearest last: popped first
+        visible = 0
+        for _, connection in self._workers:
+            connection.send(task)
+            connection.send(waiting.pop() if waiting else None)
+        for connection, count in self._answers(frame.viewer.frame):
+            visible += count
+            connection.send(waiting.pop() if waiting else None)
+        return visible
+
+    def _answers(self, frame: int) -> Iterator[tuple[Connection, int]]:
+        """Pixels drawn by the workers as their answers come, until each has said that it has no more."""
+        busy: dict[Any, Any] = {connection: process for process, connection in self._workers}
+        while busy:
+            ready: Any
+            for ready in wait(list(busy)):
+                try:
+                    answer = ready.recv()
+                except (EOFError, OSError):
+                    raise _died(busy[ready], frame) from None
+                if answer is None:
+                    del busy[ready]
+                elif isinstance(answer, str):
+                    raise RuntimeError(f"frame {frame}: a worker failed:\n{answer}")
+                else:
+                    yield ready, answer
+
+
+def _died(process: Any, frame: int) -> CheckFailedError:
+    """The error of a worker that is gone."""
+    process.join(1)
+    code = process.exitcode
+    how = f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with code {code}"
+    advice = " (out of memory? fewer threads or smaller pages need less)" if code == -signal.SIGKILL else ""
+    return CheckFailedError(Problem(f"frame {frame}: a worker process {how}{advice}"))
+
+
+def _serve(
+    connection: Connection, stage: Stage, buffers: Sequence[Buffers], arena: _Arena, parent: int
+) -> None:
+    """A worker's life: take frames, draw batches, answer; end when the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches everybody; the parent decides
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    def hear() -> Any:
+        while not connection.poll(1.0):
+            if os.getppid() != parent:
+                os._exit(0)
+        return connection.recv()
+
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            _draw_task(hear(), hear, connection, stage, buffers, arena)
+
+
+def _draw_task(
+    task: _Task,
+    hear: Callable[[], Any],
+    connection: Connection,
+    stage: Stage,
+    buffers: Sequence[Buffers],
+    arena: _Arena,
+) -> None:
+    """Draw the batches of one frame that the parent hands out."""
+    try:
+        viewer = task.viewer
+        frame = Frame(
+            viewer,
+            Sight(arena.vertices, stage.scene.triangles, arena.cut),
+            quilt_rays(stage.facets, stage.layout, task.lit, viewer.eye),
+            stage.blocks,
+            BlockPairs(arena.start, arena.triangle[: task.pairs]),
+            stage.owners,
+        )
+        while (batch := hear()) is not None:
+            connection.send(draw_batch(stage, frame, batch, buffers[task.buffers]))
+        connection.send(None)
+    except Exception:
+        connection.send(traceback.format_exc())

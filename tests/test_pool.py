@@ -1,0 +1,126 @@
+"""Worker processes: the same pixels as one process, and a clean end whatever happens."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig import cube, icosphere, viewer
+from wallscene import lights, wall
+
+from quiltcli import pool as pools
+from quiltcli.draw import draw_frame, new_buffers, stage_of
+from quiltcli.errors import CheckFailedError
+from quiltcli.job import JobFile
+from quiltcli.layout import align
+from quiltcli.packing import pack
+from quiltcli.pool import Pool, can_fork, shared_buffers
+from quiltcli.scene import Scene
+
+pytestmark = pytest.mark.skipif(not can_fork(), reason="processes cannot fork here")
+
+EYES = [(2.2, 1.8, 3.2), (-2.5, 1.2, 2), (0.2, 4, 0.3)]
+
+
+def job() -> JobFile:
+    path = {"keyframes": [{"frame": 1, "position": [0, 0, 2], "look_at": [0, 0, 0]}]}
+    spec = {
+        "display": "d.yaml",
+        "scene": "s.obj",
+        "frames": "1",
+        "viewer": {"near": 0.1, "far": 9, "path": path},
+    }
+    return JobFile.model_validate(spec)
+
+
+@pytest.fixture(scope="module")
+def stage():
+    facets, layout = align(pack(facets := cube(), "rows"), facets)
+    vertices, triangles = icosphere(3)
+    plain = wall(lights(sun=[(-1, -1, -1)], color=[(2, 2, 2)], ambient=(0.1, 0.1, 0.1)))
+    count = len(triangles)
+    scene = Scene(
+        vertices=vertices * 0.9,
+        triangles=triangles,
+        normals=vertices.astype(np.float32),
+        colors=np.ones(vertices.shape, np.float32),
+        flat=np.zeros(count, bool),
+        object=np.zeros(count, np.int32),
+        material=np.zeros(count, np.int32),
+        objects=("ball",),
+        materials=plain.materials,
+        lights=plain.lights,
+        background=np.float32([0.1, 0, 0.2]),
+        notices=(),
+    )
+    return stage_of(job(), facets, layout, scene, bleed=2)
+
+
+def test_workers_draw_the_same_pixels_as_one_process(stage):
+    alone, together = new_buffers(stage), shared_buffers(stage)
+    dirty = np.zeros(stage.facets.count, bool)
+    with Pool(stage, [together], 3) as pool:
+        for eye in EYES:
+            one = draw_frame(stage, viewer(eye), alone)
+            other = draw_frame(stage, viewer(eye), together, dirty=dirty, run=pool.draw)
+            dirty = np.ones(stage.facets.count, bool)
+            assert one.visible_pixels == other.visible_pixels > 1000
+            for name in alone:
+                np.testing.assert_array_equal(alone[name], together[name], err_msg=name)
+
+
+def children() -> set[int]:
+    return {int(pid) for pid in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()}
+
+
+def test_a_dead_worker_is_an_error_that_names_the_frame_and_leaves_nobody(stage):
+    buffers = shared_buffers(stage)
+    before = children()
+    with Pool(stage, [buffers], 2) as pool:
+        victim = max(children() - before)
+        os.kill(victim, signal.SIGKILL)
+        words = "frame 1: a worker process was killed by signal 9 .out of memory"
+        with pytest.raises(CheckFailedError, match=words):
+            draw_frame(stage, viewer(EYES[0]), buffers, run=pool.draw)
+    assert children() == before
+
+
+def test_a_fault_in_a_worker_is_told_with_its_traceback(stage, monkeypatch):
+    def fail(*given):
+        raise ZeroDivisionError("no such thing")
+
+    monkeypatch.setattr(pools, "draw_batch", fail)
+    buffers = shared_buffers(stage)
+    with (
+        Pool(stage, [buffers], 2) as pool,
+        pytest.raises(RuntimeError, match=r"frame 1: a worker failed:[\s\S]*no such thing"),
+    ):
+        draw_frame(stage, viewer(EYES[0]), buffers, run=pool.draw)
+
+
+def test_workers_do_not_outlive_a_parent_that_is_killed(stage):
+    reader, writer = os.pipe()
+    parent = os.fork()
+    if parent == 0:  # a process of its own, that dies without a word
+        pool = Pool(stage, [shared_buffers(stage)], 2)
+        pids = [process.pid for process, _ in pool._workers]
+        os.write(writer, ",".join(map(str, pids)).encode())
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(parent, 0)
+    pids = [int(pid) for pid in os.read(reader, 100).decode().split(",")]
+    for _ in range(100):
+        alive = [pid for pid in pids if Path(f"/proc/{pid}").exists() and "Z" not in state(pid)]
+        if not alive:
+            return
+        signal.sigtimedwait([], 0.1)
+    pytest.fail(f"still there: {alive}")
+
+
+def state(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return "Z"
