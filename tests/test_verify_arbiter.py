@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from rig import viewer
 
-from quiltcli.verify.arbiter import CLOSE_BY, FAULT, IMPRECISE, Neighbours, intersect, judge
-from quiltcli.verify.place import Places
-from quiltcli.verify.rays import MISS, UNSURE, aim, cast
+from quiltcli.rays.embree import MISS, UNSURE, aim, cast
+from quiltcli.rays.exact import Neighbours, intersect
+from quiltcli.rays.place import Places
+from quiltcli.verify.arbiter import CLOSE_BY, FAULT, IMPRECISE, judge
 
 # Two triangles make the square 0…8 in the plane z = −2; a third lies at −3, a fourth just behind it.
 VERTICES = np.array(

@@ -20,8 +20,8 @@ from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.homography import quilt_rays
 from quiltcli.job import JobFile
 from quiltcli.rays.embree import aim
+from quiltcli.rays.exact import Neighbours
 from quiltcli.render import viewer_path
-from quiltcli.verify.arbiter import Neighbours
 from quiltcli.verify.images import Images, find_images
 from quiltcli.verify.pixels import Trial, check_pixels
 from quiltcli.verify.sample import every_pixel, sampled_pixels

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, OwnerArray
 from quiltcli.homography import QuiltRays
 from quiltcli.layout import Layout
-from quiltcli.verify.arbiter import CLOSE_BY, FAULT, IMPRECISE, Neighbours, judge
+from quiltcli.rays.embree import MISS, Target, cast, plane_depth, plane_distance
+from quiltcli.rays.exact import Neighbours
+from quiltcli.rays.place import OFFSETS, Places, places
+from quiltcli.verify.arbiter import CLOSE_BY, FAULT, IMPRECISE, judge
 from quiltcli.verify.images import Images
-from quiltcli.verify.place import Places, places
-from quiltcli.verify.rays import MISS, Target, cast, plane_depth, plane_distance
 from quiltcli.verify.tally import MOST_FAULTS, Fault, Tally, errors_of
-from quiltcli.verify.tolerances import OFFSETS, depth_tolerance
+from quiltcli.verify.tolerances import depth_tolerance
 
 Kinds: TypeAlias = NDArray[np.str_]
 

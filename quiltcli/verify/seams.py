@@ -15,8 +15,8 @@ import numpy as np
 
 from quiltcli.display import SharedEdges
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, normalized, segments
+from quiltcli.rays.embree import Target, measure_along
 from quiltcli.verify.pixels import Sighting, Trial, sight
-from quiltcli.verify.rays import Target, measure_along
 from quiltcli.verify.tally import MOST_FAULTS, Fault
 from quiltcli.verify.tolerances import depth_tolerance
 

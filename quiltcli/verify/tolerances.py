@@ -4,12 +4,6 @@ from __future__ import annotations
 
 from quiltcli.geometry import FloatArray
 
-NEIGHBOUR = 0.05
-"""Pixels from a pixel's centre to the four rays that surround it."""
-
-OFFSETS = ((0.0, 0.0), (NEIGHBOUR, 0.0), (-NEIGHBOUR, 0.0), (0.0, NEIGHBOUR), (0.0, -NEIGHBOUR))
-"""The five rays of a pixel, in pixels from its centre; the centre comes first."""
-
 CLOSE = 1e-5
 """Share of a depth within which two surfaces are too close for either to be wrong."""
 

@@ -10,6 +10,12 @@ from quiltcli.geometry import BoolArray, FloatArray, IntArray, OwnerArray, norma
 from quiltcli.homography import QuiltRays
 from quiltcli.layout import Layout
 
+NEIGHBOUR = 0.05
+"""Pixels from a pixel's centre to the four rays that surround it."""
+
+OFFSETS = ((0.0, 0.0), (NEIGHBOUR, 0.0), (-NEIGHBOUR, 0.0), (0.0, NEIGHBOUR), (0.0, -NEIGHBOUR))
+"""The five rays of a pixel, in pixels from its centre; the centre comes first."""
+
 
 @dataclass(frozen=True)
 class Places:
