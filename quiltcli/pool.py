@@ -16,7 +16,7 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -91,6 +91,48 @@ class _Task:
     buffers: int
 
 
+@dataclass(frozen=True)
+class _Worker:
+    """A forked process and our end of the line to it."""
+
+    process: Any
+    connection: Any
+
+    def tell(self, frame: int, message: object) -> None:
+        """Send a message about a frame (CheckFailedError if the worker is gone)."""
+        try:
+            self.connection.send(message)
+        except OSError:
+            raise self._died(frame) from None
+
+    def hear(self, frame: int) -> int | None:
+        """The answer to a batch: its visible pixels, or None when there is no batch left to answer."""
+        try:
+            answer = self.connection.recv()
+        except (EOFError, OSError):
+            raise self._died(frame) from None
+        if isinstance(answer, _Fault):
+            raise RuntimeError(f"frame {frame}: a worker failed:\n{answer.traceback}")
+        return None if answer is None else int(answer)
+
+    def _died(self, frame: int) -> CheckFailedError:
+        """The error of a worker that is gone."""
+        self.process.join(1)
+        code = self.process.exitcode
+        how = f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with code {code}"
+        advice = (
+            " (out of memory? fewer threads or smaller pages need less)" if code == -signal.SIGKILL else ""
+        )
+        return CheckFailedError(Problem(f"frame {frame}: a worker process {how}{advice}"))
+
+
+@dataclass(frozen=True)
+class _Fault:
+    """What a worker answers when something in it failed."""
+
+    traceback: str
+
+
 class Pool:
     """Forked workers of one stage; a context manager that ends them."""
 
@@ -107,14 +149,14 @@ class Pool:
         )
         _ = scene.corner_normals, scene.corner_colors  # made once, before there are copies of the process
         context = multiprocessing.get_context("fork")
-        self._workers = []
+        self._workers: list[_Worker] = []
         for _number in range(workers):
             ours, theirs = context.Pipe()
             arguments = (theirs, stage, buffers, self._arena, os.getpid())
             process = context.Process(target=_serve, args=arguments, daemon=True)
             process.start()
             theirs.close()
-            self._workers.append((process, ours))
+            self._workers.append(_Worker(process, ours))
 
     def __enter__(self) -> Pool:
         return self
@@ -124,12 +166,12 @@ class Pool:
 
     def close(self) -> None:
         """End the workers, whatever they are doing."""
-        for process, connection in self._workers:
+        for worker in self._workers:
             with contextlib.suppress(OSError):
-                connection.close()
-            process.terminate()
-        for process, _ in self._workers:
-            process.join()
+                worker.connection.close()
+            worker.process.terminate()
+        for worker in self._workers:
+            worker.process.join()
         self._workers = []
 
     def fits(self, frame: Frame) -> bool:
@@ -154,40 +196,20 @@ class Pool:
         task = _Task(frame.viewer, frame.rays.lit, pairs.triangle.size, index)
         cost = [int(pairs.start[last] - pairs.start[first]) for first, last in batches]
         waiting = [batches[i] for i in np.argsort(cost, kind="stable").tolist()]  # dearest last: popped first
-        visible = 0
-        for _, connection in self._workers:
-            connection.send(task)
-            connection.send(waiting.pop() if waiting else None)
-        for connection, count in self._answers(frame.viewer.frame):
-            visible += count
-            connection.send(waiting.pop() if waiting else None)
-        return visible
-
-    def _answers(self, frame: int) -> Iterator[tuple[Connection, int]]:
-        """Pixels drawn by the workers as their answers come, until each has said that it has no more."""
-        busy: dict[Any, Any] = {connection: process for process, connection in self._workers}
+        number, visible = frame.viewer.frame, 0
+        busy: dict[Any, _Worker] = {worker.connection: worker for worker in self._workers}
+        for worker in self._workers:
+            worker.tell(number, task)
+            worker.tell(number, waiting.pop() if waiting else None)
         while busy:
-            ready: Any
-            for ready in wait(list(busy)):
-                try:
-                    answer = ready.recv()
-                except (EOFError, OSError):
-                    raise _died(busy[ready], frame) from None
+            for connection in wait(list(busy)):
+                answer = busy[connection].hear(number)
                 if answer is None:
-                    del busy[ready]
-                elif isinstance(answer, str):
-                    raise RuntimeError(f"frame {frame}: a worker failed:\n{answer}")
+                    del busy[connection]
                 else:
-                    yield ready, answer
-
-
-def _died(process: Any, frame: int) -> CheckFailedError:
-    """The error of a worker that is gone."""
-    process.join(1)
-    code = process.exitcode
-    how = f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with code {code}"
-    advice = " (out of memory? fewer threads or smaller pages need less)" if code == -signal.SIGKILL else ""
-    return CheckFailedError(Problem(f"frame {frame}: a worker process {how}{advice}"))
+                    visible += answer
+                    busy[connection].tell(number, waiting.pop() if waiting else None)
+        return visible
 
 
 def _serve(
@@ -231,4 +253,4 @@ def _draw_task(
             connection.send(draw_batch(stage, frame, batch, buffers[task.buffers]))
         connection.send(None)
     except Exception:
-        connection.send(traceback.format_exc())
+        connection.send(_Fault(traceback.format_exc()))

@@ -106,7 +106,7 @@ def test_workers_do_not_outlive_a_parent_that_is_killed(stage):
     parent = os.fork()
     if parent == 0:  # a process of its own, that dies without a word
         pool = Pool(stage, [shared_buffers(stage)], 2)
-        pids = [process.pid for process, _ in pool._workers]
+        pids = [worker.process.pid for worker in pool._workers]
         os.write(writer, ",".join(map(str, pids)).encode())
         os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(parent, 0)
