@@ -112,7 +112,8 @@ class _Worker:
         except (EOFError, OSError):
             raise self._died(frame) from None
         if isinstance(answer, _Fault):
-            raise RuntimeError(f"frame {frame}: a worker failed:\n{answer.traceback}")
+            words = f"frame {frame}: a worker failed:\n{answer.traceback}"
+            raise RuntimeError(words)  # noqa: TRY004 — the type is right; it is the news that is bad
         return None if answer is None else int(answer)
 
     def _died(self, frame: int) -> CheckFailedError:
