@@ -136,7 +136,7 @@ def _radiance(scene: Scene, eye: FloatArray, position: FloatArray, points: _Poin
         result[k] = points.steady[k]
     if not (lights.headlight or len(lights.directional_color) or len(lights.point_color)):
         return result
-    nv = np.maximum(_dot(points.normal, points.eyeward), _LEAST_COSINE)
+    nv = _dot(points.normal, points.eyeward)
     for direction, color in zip(lights.directional_direction, lights.directional_color, strict=True):
         _add_light(result, points, nv, -direction, color)
     for place, color in zip(lights.point_position, lights.point_color, strict=True):
@@ -166,7 +166,7 @@ def _add_light(
     Args:
         result: (3, k, n), added to.
         points: the points.
-        nv: (k, n) cosine between normal and eye.
+        nv: (k, n) cosine between normal and eye; below 0 where interpolation turns a normal away.
         light: (3, k, n) unit directions to the lamp, or (3,) for all.
         color: (3,) irradiance on a surface that faces the lamp.
         falloff: (k, n) factor of `color`.
@@ -174,7 +174,10 @@ def _add_light(
     one, half = np.float32(1), np.float32(0.5)
     nl = np.maximum(_dot(points.normal, light), np.float32(0))
     half_angle = np.maximum(one + _dot(points.eyeward, light), _LEAST_COSINE)
-    total = nl + nv
+    # From the cosines as they are: a normal that is bent past the silhouette must not pretend to face
+    # the half vector, or light from behind would glint along every outline.
+    total = np.maximum(nl + nv, np.float32(0))
+    nv = np.maximum(nv, _LEAST_COSINE)
     nh2 = np.minimum(half * total * total / half_angle, one)
     a2 = points.alpha2
     rest = one - a2
