@@ -39,7 +39,7 @@ def test_defaults(job_path: Path) -> None:
     job = load_job(job_path)
     folder = job_path.parent
     assert (job.display, job.scene) == (folder / "display.yaml", folder / "mesh.obj")
-    assert job.layout == PackSpec(method="maxrects", size=None, padding=2)
+    assert job.layout == PackSpec(method="auto", size=None, padding=2)
     assert job.frames == tuple(range(1, 121))
     assert job.fps == 30
     assert job.viewer.path.interpolation == "linear"

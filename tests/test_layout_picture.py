@@ -9,7 +9,8 @@ from PIL import Image
 
 from quiltcli.errors import OutputError
 from quiltcli.layout import layout_picture
-from quiltcli.layout.drawing import Label, Shape, draw_layout
+from quiltcli.layout.drawing import draw_layout
+from quiltcli.layout.shapes import Label, Shape
 from quiltcli.packing import pack
 
 TWO = flat_display([rectangle(40, 30)] * 2, names=["left", "top <1>"])

@@ -45,10 +45,21 @@ def _facets(text: str) -> tuple[int, ...]:
 def _size(text: str) -> tuple[int, int] | None:
     if text == "auto":
         return None
+    if text.isalnum() and not text[0].isdigit():
+        from quiltcli.packing import CANVASES
+
+        if text in CANVASES:
+            return CANVASES[text]
     width, cross, height = text.lower().partition("x")
     if not (cross and width.isdigit() and height.isdigit() and int(width) and int(height)):
         raise JobError(f"expected WIDTHxHEIGHT in pixels, such as 8192x8192, or auto, got {text!r}")
     return int(width), int(height)
+
+
+def _aspect(text: str) -> Any:
+    from quiltcli.packing import read_aspect
+
+    return read_aspect(text)
 
 
 def _point(text: str) -> tuple[float, ...]:
@@ -74,6 +85,7 @@ def _area(text: str) -> tuple[float, ...]:
 FRAMES = Parsed("frames", _frames)
 FACETS = Parsed("facets", _facets)
 SIZE = Parsed("size", _size)
+ASPECT = Parsed("aspect", _aspect)
 POINT = Parsed("point", _point)
 AREA = Parsed("area", _area)
 VIEW = click.Choice(("aces", "srgb"))

@@ -12,6 +12,7 @@ from urllib.parse import unquote
 
 from quiltcli.job.base import YAMLS
 from quiltcli.job.dump import plain
+from quiltcli.job.layout import PackSpec
 from quiltcli.job.loading import load_display_file, load_layout_file, load_scene_file
 from quiltcli.job.render import JobFile
 
@@ -27,13 +28,19 @@ def job_sha256(job: JobFile) -> str:
     data["display"] = plain(load_display_file(job.display), file_sha256)
     data["scene"] = plain(load_scene_file(job.scene), file_sha256)
     if isinstance(job.layout, Path):
-        # The layout names its display, which counts already, and the text it was found by.
-        layout = plain(load_layout_file(job.layout), str)
-        data["layout"] = {key: layout[key] for key in ("pages", "facets", "padding")}
+        data["layout"] = _places(job.layout)
+    elif isinstance(job.layout, PackSpec) and job.layout.pins is not None:
+        data["layout"]["pins"] = _places(job.layout.pins)
     del data["frames"]
     data["output"] = {key: data["output"][key] for key in ("channels", "compression")}
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _places(layout: Path) -> dict[str, Any]:
+    """What counts of a layout file: not its display, which counts already, nor the text it was found by."""
+    data = plain(load_layout_file(layout), str)
+    return {key: data[key] for key in ("pages", "facets", "padding")}
 
 
 def file_sha256(path: Path) -> str:

@@ -19,25 +19,40 @@ from quiltcli.job.base import (
     Natural,
     Number,
     OneOf,
+    Positive,
     Size,
     Vec3,
 )
 
 # Names of the packing stage, which comes later; known here so that a wrong one is shown in its line.
-PACKING_METHODS = ("maxrects", "rows")
+PACKING_METHODS = ("auto", "rows", "rects", "maxrects", "nest", "net")
 
 
 class PackSpec(Model):
     """How to pack the facets of a display onto quilt pages."""
 
-    method: Annotated[str, OneOf(PACKING_METHODS)] = "maxrects"
-    """Packing method."""
+    method: Annotated[str, OneOf(PACKING_METHODS)] = "auto"
+    """Packing method; net takes each facet's raster from the quilt, the others leave it as it is."""
     size: Size | None = None
     """Width and height of a page, pixels; one page that holds everything when absent."""
     max_pages: Count | None = None
     """Most pages that may be used; any number when absent."""
     padding: Natural = 2
     """Pixels kept free between facets."""
+    aspect: Annotated[float, Field(allow_inf_nan=False, ge=0.01, le=100)] | None = None
+    """Width divided by height of a page whose size is not given; any when absent."""
+    align: Count = 1
+    """Facets' top-left pixels lie at multiples of this."""
+    mirror: bool = False
+    """Whether facets may be mirrored in the quilt."""
+    page_facets: Count | None = None
+    """Most facets on a page."""
+    page_pixels: Count | None = None
+    """Most pixels of facets on a page."""
+    pins: AnyPath | None = None
+    """A layout file whose facets stay where they are; the others are packed around them."""
+    seconds: Positive = 10.0
+    """Effort, in seconds on a slow computer; the result does not depend on the computer."""
 
 
 class UvLayoutSpec(Model):

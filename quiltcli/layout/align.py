@@ -29,7 +29,7 @@ def align(layout: Layout, facets: Facets) -> tuple[Facets, Layout]:
             a raster that does not lie on its facet; all that is found, together.
     """
     raise_all(LayoutError, _strangers(layout, facets))
-    raise_all(LayoutError, _misfits(layout, facets))
+    raise_all(LayoutError, misfits(layout, facets))
     row = np.full(facets.count, -1)
     row[layout.facet - 1] = np.arange(layout.facet.size)
     known = row >= 0
@@ -101,7 +101,7 @@ def _strangers(layout: Layout, facets: Facets) -> Iterator[Problem]:
         yield layout.problem(f"{message} disable it", key="facets")
 
 
-def _misfits(layout: Layout, facets: Facets) -> Iterator[Problem]:
+def misfits(layout: Layout, facets: Facets) -> Iterator[Problem]:
     """Rasters and polygons that do not lie on the display's facets."""
     counts, expected = np.diff(layout.corner_start), np.diff(facets.corner_start)[layout.facet - 1]
     for at in np.flatnonzero(counts != expected):

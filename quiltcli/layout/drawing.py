@@ -5,62 +5,42 @@ from __future__ import annotations
 import colorsys
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from quiltcli.display import Facets
 from quiltcli.geometry import FloatArray
+from quiltcli.layout.portrait import draw_display, facet_colors
 from quiltcli.layout.record import Layout, quilt_polygons
+from quiltcli.layout.shapes import Drawing, Label, Shape
 from quiltcli.layout.spans import Spans, facet_spans
+
+__all__ = ["FAINT", "INK", "PAGE", "PAGE_EDGE", "PAPER", "Drawing", "Label", "Shape", "draw_layout"]
 
 PAPER, PAGE, PAGE_EDGE, INK, FAINT = "#14161b", "#23272f", "#4a515e", "#f2f4f8", "#9aa4b5"
 _FACET_INK = "#10131a"
 _WIDEST = 2048
-_MARGIN, _HEADER, _TITLE = 28, 76, 34
+_EDGE = "#0c0e12"
+_MARGIN, _HEADER, _TITLE, _PORTRAIT = 28, 76, 34, 420
 
 
-@dataclass(frozen=True)
-class Shape:
-    """A filled polygon (n, 2) with an outline, in picture pixels."""
+def draw_layout(layout: Layout, names: Sequence[str] = (), facets: Facets | None = None) -> Drawing:
+    """Pages side by side with their facets, ids, names (by id, from 1) and fill figures.
 
-    points: FloatArray
-    fill: str
-    outline: str
-    width: float
-
-
-@dataclass(frozen=True)
-class Label:
-    """A line of text; `anchor` is `middle` (centred both ways) or `start` (left end, vertically centred)."""
-
-    x: float
-    y: float
-    size: float
-    text: str
-    color: str
-    anchor: str
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """Everything to draw, back to front, on a picture of `width` × `height` pixels."""
-
-    width: int
-    height: int
-    items: tuple[Shape | Label, ...]
-
-
-def draw_layout(layout: Layout, names: Sequence[str] = ()) -> Drawing:
-    """Pages side by side with their facets, ids, names (by id, from 1) and fill figures."""
+    With the display's facets, a little drawing of the display stands to the right of the pages, and
+    the facets are coloured by their place on it.
+    """
     columns = _columns(layout)
     rows = math.ceil(len(layout.pages) / columns)
     widest, highest = (int(side) for side in layout.pages.max(axis=0))
-    across = _WIDEST - 1 - _MARGIN * (columns + 1)
+    aside = _PORTRAIT + _MARGIN if facets is not None else 0
+    across = _WIDEST - 1 - _MARGIN * (columns + 1) - aside
     down = _WIDEST - 1 - _HEADER - (_TITLE + _MARGIN) * rows
     scale = min(across / (columns * widest), down / (rows * highest))
     cell = np.array([widest * scale + _MARGIN, highest * scale + _TITLE + _MARGIN])
     width = max(math.ceil(columns * cell[0]) + _MARGIN, 640)
+    colors = _plain_colors(layout) if facets is None else facet_colors(facets)
     spans = facet_spans(layout)
     items: list[Shape | Label] = list(_header(layout, spans))
     quilt = quilt_polygons(layout)
@@ -69,8 +49,21 @@ def draw_layout(layout: Layout, names: Sequence[str] = ()) -> Drawing:
         items += _page(layout, page, corner, scale, spans)
         for row in np.flatnonzero(layout.page == page):
             polygon = quilt[layout.corner_start[row] : layout.corner_start[row + 1]]
-            items += _facet(layout, int(row), corner + polygon * scale, names)
-    return Drawing(width, math.ceil(_HEADER + rows * cell[1]), tuple(items))
+            color = colors[int(layout.facet[row]) - 1]
+            items += _facet(layout, int(row), corner + polygon * scale, color, names)
+    height = math.ceil(_HEADER + rows * cell[1])
+    if facets is not None:
+        items += draw_display(
+            facets, np.array([width, _HEADER + _TITLE]), np.array([_PORTRAIT, _PORTRAIT]), _EDGE
+        )
+        height = max(height, _HEADER + _TITLE + _PORTRAIT + _MARGIN)
+    return Drawing(width + aside, height, tuple(items))
+
+
+def _plain_colors(layout: Layout) -> list[str]:
+    """Golden-ratio steps of hue, which keep facets that follow each other apart."""
+    hues = [(facet * 0.6180339887) % 1 for facet in range(1, int(layout.facet.max(initial=0)) + 1)]
+    return [_color(hue, 0.82, 0.5) for hue in hues]
 
 
 def _columns(layout: Layout) -> int:
@@ -105,11 +98,11 @@ def _page(
     yield Shape(box, PAGE, PAGE_EDGE, 1)
 
 
-def _facet(layout: Layout, row: int, polygon: FloatArray, names: Sequence[str]) -> Iterator[Shape | Label]:
+def _facet(
+    layout: Layout, row: int, polygon: FloatArray, color: str, names: Sequence[str]
+) -> Iterator[Shape | Label]:
     facet = int(layout.facet[row])
-    # Golden-ratio steps of hue keep facets that follow each other apart.
-    hue = (facet * 0.6180339887) % 1
-    yield Shape(polygon, _color(hue, 0.82, 0.5), _color(hue, 1.0, 0.3), 1)
+    yield Shape(polygon, color, _EDGE, 1)
     centre, radius = _roomiest(polygon)
     size = min(1.05 * radius / max(1.0, 0.45 * len(str(facet))), 64)
     if size < 5:

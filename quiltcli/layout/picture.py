@@ -6,15 +6,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+from quiltcli.display import Facets
 from quiltcli.errors import OutputError, Problem
-from quiltcli.layout.drawing import PAPER, Drawing, Label, Shape, draw_layout
+from quiltcli.layout.drawing import PAPER, draw_layout
 from quiltcli.layout.record import Layout
+from quiltcli.layout.shapes import Drawing, Label, Shape
 from quiltcli.wholefile import whole_file, write_text
 
 _FINER = 2  # drawn this much larger, then reduced: smooth edges
 
 
-def layout_picture(layout: Layout, path: str | Path, names: Sequence[str] = ()) -> None:
+def layout_picture(
+    layout: Layout, path: str | Path, names: Sequence[str] = (), facets: Facets | None = None
+) -> None:
     """Draw the layout with facet ids, names and fill figures, at most 2048 pixels wide and high.
 
     The small triangle in a facet points to where its image's top is.
@@ -23,12 +27,13 @@ def layout_picture(layout: Layout, path: str | Path, names: Sequence[str] = ()) 
         layout: a layout that `check_layout` accepts.
         path: a file name that ends in .png or .svg.
         names: names of the facets by id; empty strings are not drawn.
+        facets: the display, to draw it beside the pages and to take names from.
 
     Raises:
         OutputError: another ending, or the file cannot be written.
     """
     path = Path(path)
-    drawing = draw_layout(layout, names)
+    drawing = draw_layout(layout, names or (facets.names if facets is not None else ()), facets)
     if path.suffix.lower() == ".svg":
         write_text(path, svg_text(drawing))
     elif path.suffix.lower() == ".png":

@@ -1,7 +1,22 @@
 """Packing: find a place in the quilt for every facet of a display."""
 
+from quiltcli.packing.attempt import Attempt, Method
 from quiltcli.packing.choice import layout_for
-from quiltcli.packing.model import Method, PackInput, PackResult
-from quiltcli.packing.pack import DEFAULT_METHOD, METHODS, pack
+from quiltcli.packing.methods import DEFAULT_METHOD, METHODS
+from quiltcli.packing.model import PackInput, PackResult
+from quiltcli.packing.pack import pack
+from quiltcli.packing.target import CANVASES, DEFAULT_SECONDS, read_aspect
 
-__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "PackInput", "PackResult", "layout_for", "pack"]
+__all__ = [
+    "CANVASES",
+    "DEFAULT_METHOD",
+    "DEFAULT_SECONDS",
+    "METHODS",
+    "Attempt",
+    "Method",
+    "PackInput",
+    "PackResult",
+    "layout_for",
+    "pack",
+    "read_aspect",
+]

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, Int32Array, IntArray
-from quiltcli.packing.model import PackInput, PackResult, page_count, placed_size
+from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.packing.model import FAR, PackInput, PackResult, Room, grown_size, page_count, used_height
 
 
 def pack_maxrects(wanted: PackInput) -> PackResult:
@@ -17,57 +17,66 @@ def pack_maxrects(wanted: PackInput) -> PackResult:
 
     Best is fewest pages, then least height on the last page; the first order among equals.
     """
+    results = [place_maxrects(wanted, order) for order in size_orders(wanted)]
+    return min(results, key=lambda result: (page_count(result), used_height(wanted, result)))
+
+
+def size_orders(wanted: PackInput) -> list[IntArray]:
+    """Three orders of the facets, largest first: by longer side, by shorter side, by area."""
     long, short = wanted.size.max(axis=1).astype(np.int64), wanted.size.min(axis=1).astype(np.int64)
     index = np.arange(long.size)
-    orders = ((index, -short, -long), (index, -long, -short), (index, -long, -long * short))
-    results = [_place_all(wanted, np.lexsort(keys)) for keys in orders]
-    return min(results, key=lambda result: _cost(wanted, result))
+    keys = ((index, -short, -long), (index, -long, -short), (index, -long, -long * short))
+    return [np.lexsort(key) for key in keys]
 
 
-def _cost(wanted: PackInput, result: PackResult) -> tuple[int, int]:
-    bottom = result.corner[:, 1] + placed_size(wanted.size, result.turn)[:, 1]
-    pages = page_count(result)
-    return pages, int(bottom[result.page == pages - 1].max(initial=0))
-
-
-def _place_all(wanted: PackInput, order: IntArray) -> PackResult:
-    """Place facets in this order, each on the first page that has room for it."""
+def place_maxrects(wanted: PackInput, order: IntArray) -> PackResult:
+    """Place facets in this order, each in the first room that takes it."""
     count = len(order)
     page, turn = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
     corner = np.zeros((count, 2), dtype=np.int32)
-    # Rectangles grow by the padding to the right and down, and so does the page.
-    end = np.array(wanted.page, dtype=np.int64) + wanted.padding
-    free: list[IntArray] = []
-    for i in order:
-        grown = wanted.size[i] + wanted.padding
-        for at, rectangles in enumerate([*free, None]):
-            if rectangles is None:
-                rectangles = np.array([[0, 0, *end]])
-                free.append(rectangles)
-            spot = _best_spot(rectangles, grown)
+    grown = grown_size(wanted)
+    rooms = list(wanted.rooms)
+    free = [_whole(room) for room in rooms]
+    for i in order.tolist():
+        size, taken = tuple(wanted.size[i].tolist()), tuple(grown[i].tolist())
+        for at in range(len(rooms) + 1):
+            if at == len(rooms):
+                fresh = rooms[-1].page + 1 if at > len(wanted.rooms) else wanted.begun
+                rooms.append(Room(fresh, 0, 0, *wanted.page))
+                free.append(_whole(rooms[at]))
+            spot = _best_spot(free[at], rooms[at], size, taken)
             if spot is not None:
                 x, y, turn[i] = spot
-                page[i], corner[i] = at, (x, y)
-                w, h = grown[::-1] if turn[i] else grown
-                free[at] = _without(rectangles, x, y, x + int(w), y + int(h))
+                page[i], corner[i] = rooms[at].page, (x, y)
+                w, h = taken[::-1] if turn[i] else taken
+                free[at] = without(free[at], x, y, x + w, y + h)
                 break
     return PackResult(page, turn, np.zeros(count, dtype=np.bool_), corner)
 
 
-def _best_spot(free: IntArray, size: Int32Array) -> tuple[int, int, int] | None:
+def _whole(room: Room) -> IntArray:
+    """The one free rectangle of an empty room; padding may reach past its end."""
+    return np.array([[room.left, room.top, FAR, FAR]])
+
+
+def _best_spot(
+    free: IntArray, room: Room, size: tuple[int, int], grown: tuple[int, int]
+) -> tuple[int, int, int] | None:
     """Left, top and quarter turns where a rectangle ends highest, then leftmost; None without room."""
     best = None
-    for turn, (w, h) in enumerate((size, size[::-1])[: 1 if size[0] == size[1] else 2]):
-        room = (free[:, 2] - free[:, 0] >= w) & (free[:, 3] - free[:, 1] >= h)
-        if room.any():
-            x, y = free[room, 0], free[room, 1]
+    right, bottom = room.left + room.width, room.top + room.height
+    for turn, ((w, h), (a, b)) in enumerate(((size, grown), (size[::-1], grown[::-1]))):
+        fits = (free[:, 2] - free[:, 0] >= a) & (free[:, 3] - free[:, 1] >= b)
+        fits &= (free[:, 0] + w <= right) & (free[:, 1] + h <= bottom)
+        if fits.any():
+            x, y = free[fits, 0], free[fits, 1]
             at = int(np.argmin((y << 32) + x))
-            spot = (int(y[at] + h), int(x[at]), turn, int(y[at]))
+            spot = (int(y[at]) + b, int(x[at]), turn, int(y[at]))
             best = spot if best is None else min(best, spot)
     return None if best is None else (best[1], best[3], best[2])
 
 
-def _without(free: IntArray, x0: int, y0: int, x1: int, y1: int) -> IntArray:
+def without(free: IntArray, x0: int, y0: int, x1: int, y1: int) -> IntArray:
     """Maximal free rectangles (n, 4: left, top, right, bottom) after this one is taken."""
     hit = (free[:, 0] < x1) & (free[:, 2] > x0) & (free[:, 1] < y1) & (free[:, 3] > y0)
     whole, cut = free[~hit], free[hit]

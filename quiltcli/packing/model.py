@@ -4,9 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
 
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
+from quiltcli.layout.record import PIXEL_TOLERANCE
+
+FAR = 1 << 30
+"""Pixels past the end of any page."""
+
+
+class Room(NamedTuple):
+    """A free rectangle of a page: 0-based page, left, top, width, height in pixels."""
+
+    page: int
+    left: int
+    top: int
+    width: int
+    height: int
 
 
 @dataclass(frozen=True)
@@ -19,6 +35,11 @@ class PackInput:
         polygon: (C, 2) corners in facet pixels.
         page: width and height of a page.
         padding: pixels to keep free between facets; none is needed at the page's border.
+        align: top-left pixels of placed rasters lie at multiples of this.
+        mirror: whether rasters may be mirrored.
+        rooms: free rectangles of pages that something is on already; none means every page is empty.
+        begun: number of those pages; fresh pages are numbered from here on.
+        vertex: (C,) number of the display's vertex at each corner; None when it is not known.
     """
 
     size: Int32Array
@@ -26,6 +47,11 @@ class PackInput:
     polygon: FloatArray
     page: tuple[int, int]
     padding: int
+    align: int = 1
+    mirror: bool = False
+    rooms: tuple[Room, ...] = ()
+    begun: int = 0
+    vertex: IntArray | None = None
 
 
 @dataclass(frozen=True)
@@ -40,12 +66,15 @@ class PackResult:
         turn: (n,) quarter turns clockwise, 0 to 3.
         mirror: (n,) whether the raster is mirrored in the quilt.
         corner: (n, 2) pixel x, y of the placed raster's top-left pixel.
+        polygon: (C, 2) corners in page pixels, from a method that turns facets by any angle; `turn`
+            and `mirror` then mean nothing, and `corner` is the top-left pixel of the polygon's box.
     """
 
     page: Int32Array
     turn: Int32Array
     mirror: BoolArray
     corner: Int32Array
+    polygon: FloatArray | None = None
 
 
 Method: TypeAlias = Callable[[PackInput], PackResult]
@@ -57,6 +86,27 @@ def placed_size(size: Int32Array, turn: Int32Array) -> Int32Array:
     odd = turn % 2 == 1
     result[odd] = size[odd][:, ::-1]
     return result
+
+
+def grown_size(wanted: PackInput) -> IntArray:
+    """What rasters (n, 2) take with their padding to the right and below, in whole steps of the alignment."""
+    steps = -(-(wanted.size.astype(np.int64) + wanted.padding) // wanted.align)
+    result: IntArray = steps * wanted.align
+    return result
+
+
+def extents(wanted: PackInput, result: PackResult) -> IntArray:
+    """Right and lower end (n, 2) of every placed facet, in whole pixels."""
+    if result.polygon is None:
+        return (result.corner + placed_size(wanted.size, result.turn)).astype(np.int64)
+    ends = np.maximum.reduceat(result.polygon, wanted.corner_start[:-1], axis=0)
+    return np.ceil(ends - PIXEL_TOLERANCE).astype(np.int64)
+
+
+def used_height(wanted: PackInput, result: PackResult) -> int:
+    """Pixels from the top of the last page to the lower end of what is on it."""
+    bottom = extents(wanted, result)[:, 1]
+    return int(bottom[result.page == page_count(result) - 1].max(initial=0))
 
 
 def page_count(result: PackResult) -> int:

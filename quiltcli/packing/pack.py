@@ -1,25 +1,27 @@
-"""From a display to a layout: choose the page, run the method, write down the transforms."""
+"""From a display to a layout: choose the page, make the attempts, write down the transforms."""
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 
 from quiltcli.display import Facets, corner_pixels
+from quiltcli.display.weld import weld
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import Int32Array, segments
-from quiltcli.layout.fromuv import MIRROR, QUARTER_TURNS
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
+from quiltcli.layout.fromuv import MIRROR, QUARTER_TURNS, layout_from_polygons
 from quiltcli.layout.record import Layout
-from quiltcli.packing.autosize import LARGEST_PAGE, pack_auto
-from quiltcli.packing.maxrects import pack_maxrects
-from quiltcli.packing.model import Method, PackInput, PackResult, page_count
-from quiltcli.packing.rows import pack_rows
+from quiltcli.packing.methods import DEFAULT_METHOD, METHODS
+from quiltcli.packing.model import PackInput, PackResult, page_count
+from quiltcli.packing.pins import free_rooms, joined, pinned
+from quiltcli.packing.search import best_page, best_pages, largest_page
+from quiltcli.packing.shortage import shortage
+from quiltcli.packing.target import DEFAULT_SECONDS, Target, bad_target
 
-METHODS: Mapping[str, Method] = {"maxrects": pack_maxrects, "rows": pack_rows}
-DEFAULT_METHOD = "maxrects"
 _MOST_PROBLEMS = 10
 
 
@@ -29,8 +31,16 @@ def pack(
     size: tuple[int, int] | None = None,
     padding: int = 2,
     max_pages: int | None = None,
+    *,
+    aspect: Fraction | None = None,
+    align: int = 1,
+    mirror: bool = False,
+    page_facets: int | None = None,
+    page_pixels: int | None = None,
+    pins: Layout | None = None,
+    seconds: float = DEFAULT_SECONDS,
 ) -> Layout:
-    """Lay out the display's enabled facets on pages of a quilt; no image is resampled.
+    """Lay out the display's enabled facets on pages of a quilt; only `net` takes new rasters for them.
 
     Args:
         facets: the display; a facet's raster is placed as it is, or turned by quarter turns.
@@ -38,65 +48,139 @@ def pack(
         size: page width and height in pixels; None chooses one page that holds everything.
         padding: pixels to keep free between facets.
         max_pages: most pages to take; None takes as many as are needed.
+        aspect: width / height of the page that is chosen; None for any.
+        align: top-left pixels of placed rasters lie at multiples of this.
+        mirror: whether `nest` and `auto` may mirror rasters.
+        page_facets: most facets on a page.
+        page_pixels: most raster pixels on a page, what a sending card or port takes.
+        pins: a layout whose facets stay where they are; the others are packed around them.
+        seconds: effort, in seconds on a slow computer; the result depends on it, but on no clock.
 
     Raises:
         LayoutError: an argument makes no sense, a facet is larger than the page, or there are more
             pages than allowed; the message says what would do.
     """
-    raise_all(LayoutError, _bad_arguments(facets, method, size, padding, max_pages))
-    rows = np.flatnonzero(facets.enabled)
-    raise_all(LayoutError, _too_large(facets, rows, size))
-    wanted = _pack_input(facets, rows, size or (LARGEST_PAGE, LARGEST_PAGE), padding)
-    if size is None:
-        result, size = pack_auto(METHODS[method], wanted)
+    target = Target(
+        method, size, padding, max_pages, aspect, align, mirror, page_facets, page_pixels, pins, seconds
+    )
+    return pack_target(facets, target)
+
+
+def pack_target(facets: Facets, target: Target) -> Layout:
+    """As `pack`, of a target."""
+    raise_all(LayoutError, _bad_arguments(facets, target))
+    pins = pinned(target.pins, facets) if target.pins is not None else None
+    waiting = facets.enabled.copy()
+    if pins is not None and len(pins.facet):
+        waiting[pins.facet - 1] = False
+        target = replace(target, size=target.size or (int(pins.pages[-1, 0]), int(pins.pages[-1, 1])))
     else:
-        result = METHODS[method](wanted)
-    needed = page_count(result)
-    if max_pages is not None and needed > max_pages:
+        pins = None
+    rows = np.flatnonzero(waiting)
+    raise_all(LayoutError, _too_large(facets, rows, target))
+    if pins is not None and not rows.size:
+        return replace(pins, display=facets.path, display_sha256=facets.sha256, path="", place=None)
+    groups = list(_groups(facets, rows, target))
+    if len(groups) > 1:
+        return _stacked(facets, groups, target)
+    wanted = _pack_input(facets, rows, target)
+    if pins is not None:
+        smallest = int(wanted.size.min())
+        rooms = free_rooms(pins, target.padding, target.align, smallest)
+        wanted = replace(wanted, rooms=rooms, begun=len(pins.pages))
+    result, size = _packed(wanted, target)
+    needed = max(page_count(result), wanted.begun)
+    if target.max_pages is not None and needed > target.max_pages:
+        raise LayoutError(Problem(shortage(wanted, result, target, size), file=facets.path))
+    layout = _layout(facets, rows, wanted, result, size, target.method)
+    return layout if pins is None else joined(pins, layout)
+
+
+def _packed(wanted: PackInput, target: Target) -> tuple[PackResult, tuple[int, int]]:
+    """Places and page size."""
+    attempts = METHODS[target.method](wanted, target.seconds)
+    if target.size is not None:
+        return best_pages(attempts, wanted, target.seconds), target.size
+    return best_page(attempts, wanted, target.seconds, target.aspect)
+
+
+def _groups(facets: Facets, rows: IntArray, target: Target) -> Iterator[IntArray]:
+    """Facets of consecutive ids that keep the limits of a page together; all of them without limits."""
+    if target.page_facets is None and target.page_pixels is None:
+        yield rows
+        return
+    pixels = facets.size[rows].astype(np.int64).prod(axis=1)
+    start = 0
+    while start < len(rows):
+        end = start + (target.page_facets or len(rows))
+        if target.page_pixels is not None:
+            total = np.cumsum(pixels[start:])
+            end = min(end, start + int(np.searchsorted(total, target.page_pixels, side="right")))
+        yield rows[start:end]
+        start = end
+
+
+def _stacked(facets: Facets, groups: Sequence[IntArray], target: Target) -> Layout:
+    """A layout whose groups each begin a page."""
+    alone = replace(target, page_facets=None, page_pixels=None, max_pages=None)
+    whole: Layout | None = None
+    for group in groups:
+        enabled = np.zeros(facets.count, dtype=np.bool_)
+        enabled[group] = True
+        layout = pack_target(replace(facets, enabled=enabled), alone)
+        if whole is not None:
+            before = np.zeros_like(whole.pages)
+            layout = replace(
+                layout,
+                page=layout.page + len(whole.pages),
+                pages=np.concatenate((before, layout.pages)),
+            )
+            layout = joined(whole, layout)
+        whole = layout
+    assert whole is not None
+    needed = len(whole.pages)
+    if target.max_pages is not None and needed > target.max_pages:
+        width, height = whole.pages[0]
         raise LayoutError(
             Problem(
-                f"{len(rows)} facets take {_pages(needed)} of {size[0]}×{size[1]} pixels by the method"
-                f" {method}, but at most {max_pages} may be used",
+                f"{len(whole.facet)} facets take {needed} pages of {width}×{height} pixels within the limits"
+                f" of a page, but at most {target.max_pages} may be used",
                 file=facets.path,
             )
         )
-    return _layout(facets, rows, wanted, result, size, method)
+    return whole
 
 
-def _pages(count: int) -> str:
-    return "1 page" if count == 1 else f"{count} pages"
-
-
-def _bad_arguments(
-    facets: Facets, method: str, size: tuple[int, int] | None, padding: int, max_pages: int | None
-) -> Iterator[Problem]:
-    if method not in METHODS:
-        near = difflib.get_close_matches(method, METHODS, 1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        yield Problem(f"unknown packing method {method!r} (known: {', '.join(METHODS)}{hint})")
-    if size is not None and min(size) < 1:
-        yield Problem(f"page size {size[0]}×{size[1]}; both must be at least 1 pixel")
-    if padding < 0:
-        yield Problem(f"padding {padding}; it must be 0 pixels or more")
-    if max_pages is not None and max_pages < 1:
-        yield Problem(f"at most {max_pages} pages; it must be at least 1")
+def _bad_arguments(facets: Facets, target: Target) -> Iterator[Problem]:
+    yield from bad_target(target)
     if not facets.enabled.any():
         yield Problem("no facet is enabled, so there is nothing to pack", file=facets.path)
+    if target.page_pixels is not None and target.page_pixels >= 1:
+        pixels = facets.size.astype(np.int64).prod(axis=1)
+        for row in np.flatnonzero(facets.enabled & (pixels > target.page_pixels))[:_MOST_PROBLEMS]:
+            yield Problem(
+                f"{_facet(facets, int(row))} has {pixels[row]} pixels,"
+                f" more than the {target.page_pixels} of a page",
+                file=facets.path,
+            )
 
 
-def _too_large(facets: Facets, rows: np.ndarray, size: tuple[int, int] | None) -> Iterator[Problem]:
+def _facet(facets: Facets, row: int) -> str:
+    return f"facet {row + 1}" + (f" ({facets.names[row]})" if facets.names[row] else "")
+
+
+def _too_large(facets: Facets, rows: IntArray, target: Target) -> Iterator[Problem]:
     """Facets that no turn makes fit, with the page or density that would hold them."""
-    limit = sorted(size or (LARGEST_PAGE, LARGEST_PAGE))
+    width, height = target.size or largest_page(target.aspect)
+    limit = sorted((width, height))
     sides = np.sort(facets.size[rows], axis=1)
     large = np.flatnonzero((sides > limit).any(axis=1))
-    width, height = size or (LARGEST_PAGE, LARGEST_PAGE)
     for at in large[:_MOST_PROBLEMS]:
         row = int(rows[at])
-        name = f" ({facets.names[row]})" if facets.names[row] else ""
         w, h = facets.size[row]
         density = 100 * min(limit[0] / sides[at, 0], limit[1] / sides[at, 1])
         yield Problem(
-            f"facet {row + 1}{name} is {w}×{h} pixels, more than a {width}×{height} page holds turned or not;"
+            f"{_facet(facets, row)} is {w}×{h} pixels, more than a {width}×{height} page holds turned or not;"
             f" a page of {sides[:, 1].max()}×{sides[:, 0].max()} would, or a density of at most"
             f" {math.floor(density * 10) / 10:g} % of the present one",
             file=facets.path,
@@ -105,28 +189,36 @@ def _too_large(facets: Facets, rows: np.ndarray, size: tuple[int, int] | None) -
         yield Problem(f"{large.size - _MOST_PROBLEMS} more facets are larger than the page", file=facets.path)
 
 
-def _pack_input(facets: Facets, rows: np.ndarray, page: tuple[int, int], padding: int) -> PackInput:
+def _pack_input(facets: Facets, rows: IntArray, target: Target) -> PackInput:
     corner_row, _ = segments(facets.corner_start)
+    mine = np.zeros(facets.count, dtype=np.bool_)
+    mine[rows] = True
     return PackInput(
         size=facets.size[rows],
         corner_start=np.concatenate(([0], np.cumsum(np.diff(facets.corner_start)[rows]))),
-        polygon=corner_pixels(facets)[facets.enabled[corner_row]],
-        page=page,
-        padding=padding,
+        polygon=corner_pixels(facets)[mine[corner_row]],
+        page=target.size or largest_page(target.aspect),
+        padding=target.padding,
+        align=target.align,
+        mirror=target.mirror,
+        vertex=weld(facets.corners)[mine[corner_row]] if target.method == "net" else None,
     )
 
 
 def _layout(
     facets: Facets,
-    rows: np.ndarray,
+    rows: IntArray,
     wanted: PackInput,
     result: PackResult,
     size: tuple[int, int],
     method: str,
 ) -> Layout:
+    pages = np.array([size] * max(page_count(result), wanted.begun), dtype=np.int32)
+    if result.polygon is not None:
+        return _layout_of_polygons(facets, rows, wanted, result, pages, method)
     return Layout(
         facet=(rows + 1).astype(np.int32),
-        page=result.page,
+        page=result.page.astype(np.int32),
         size=facets.size[rows],
         quilt_from_facet=quilt_from_facet(wanted.size, result),
         origin=facets.origin[rows],
@@ -134,7 +226,7 @@ def _layout(
         dv=facets.dv[rows],
         corner_start=wanted.corner_start,
         polygon=wanted.polygon,
-        pages=np.array([size] * page_count(result), dtype=np.int32),
+        pages=pages,
         padding=wanted.padding,
         method=method,
         display=facets.path,
@@ -142,7 +234,20 @@ def _layout(
     )
 
 
-def quilt_from_facet(size: Int32Array, result: PackResult) -> np.ndarray:
+def _layout_of_polygons(
+    facets: Facets, rows: IntArray, wanted: PackInput, result: PackResult, pages: Int32Array, method: str
+) -> Layout:
+    """Rasters taken from the quilt, where facets lie at any angle."""
+    assert result.polygon is not None
+    corner_row, _ = segments(facets.corner_start)
+    page = np.full(facets.count, -1, dtype=np.int32)
+    page[rows] = result.page
+    quilt = np.zeros((len(corner_row), 2))
+    quilt[page[corner_row] >= 0] = result.polygon
+    return layout_from_polygons(facets, quilt, page, pages, padding=wanted.padding, method=method)
+
+
+def quilt_from_facet(size: Int32Array, result: PackResult) -> FloatArray:
     """Whole-pixel maps (n, 2, 3) that put rasters of `size` (n, 2) where the result has them."""
     turns = QUARTER_TURNS[result.turn]
     turns = np.where(result.mirror[:, None, None], turns @ MIRROR, turns)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from quiltcli.packing.model import PackInput, PackResult, placed_size
+from quiltcli.packing.model import PackInput, PackResult, Room, grown_size
 
 
 def pack_rows(wanted: PackInput) -> PackResult:
@@ -13,19 +15,31 @@ def pack_rows(wanted: PackInput) -> PackResult:
     A row is as high as its highest facet. Only a facet that is too wide or too high for the page
     as it stands is turned, clockwise once.
     """
-    width, height = wanted.page
     count = len(wanted.size)
-    turn = np.zeros(count, dtype=np.int32)
+    page, turn = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
+    corner = np.zeros((count, 2), dtype=np.int32)
     turn[(wanted.size > np.array(wanted.page)).any(axis=1)] = 1
-    page, corner = np.zeros(count, dtype=np.int32), np.zeros((count, 2), dtype=np.int32)
-    x = y = row_height = current = 0
-    for i, (w, h) in enumerate(placed_size(wanted.size, turn).tolist()):
-        if x + w > width:
-            x, y, row_height = 0, y + row_height + wanted.padding, 0
-        # A facet higher than its row so far can still push the row over the page's end.
-        if y + h > height:
+    sizes, steps = wanted.size.tolist(), grown_size(wanted).tolist()
+    rooms = _rooms(wanted)
+    room = next(rooms)
+    x = y = row_height = 0
+    for i in range(count):
+        (w, h), (across, down) = (pair[::-1] if turn[i] else pair for pair in (sizes[i], steps[i]))
+        if x + w > room.width:
+            x, y, row_height = 0, y + row_height, 0
+        # A facet higher than its row so far can still push the row over the room's end.
+        while x + w > room.width or y + h > room.height:
             x = y = row_height = 0
-            current += 1
-        page[i], corner[i] = current, (x, y)
-        x, row_height = x + w + wanted.padding, max(row_height, h)
+            room = next(rooms)
+        page[i], corner[i] = room.page, (room.left + x, room.top + y)
+        x, row_height = x + across, max(row_height, down)
     return PackResult(page, turn, np.zeros(count, dtype=np.bool_), corner)
+
+
+def _rooms(wanted: PackInput) -> Iterator[Room]:
+    """The rooms of begun pages, then fresh pages."""
+    yield from wanted.rooms
+    page = wanted.begun
+    while True:
+        yield Room(page, 0, 0, *wanted.page)
+        page += 1

@@ -1,0 +1,78 @@
+"""Nesting by true outlines: interlocking shelves, and for few facets a mosaic improved step by step."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+from quiltcli.packing.attempt import SLOW, Attempt, least_width
+from quiltcli.packing.improve import Mosaic
+from quiltcli.packing.model import PackInput, PackResult
+from quiltcli.packing.shapes import Shapes, facet_shapes
+from quiltcli.packing.shelves import ShelfRule, pack_shelves
+
+_RULES = (
+    ShelfRule(window=12, slack=10, levels=4),
+    ShelfRule(window=40, slack=10, levels=4),
+    ShelfRule(window=12, slack=3, levels=2),
+    ShelfRule(window=1, slack=3, levels=2),
+    ShelfRule(window=100, slack=20, levels=8),
+)
+FEW = 120
+"""Facets up to which a mosaic pays."""
+
+_IMPROVING = 0.3  # of the time, for improving the mosaic on one page width
+
+
+def nest_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
+    """Shelves by several rules; for few facets mosaics too, improved in more steps for more time."""
+    return shape_attempts(wanted, facet_shapes(wanted), seconds)
+
+
+def shape_attempts(wanted: PackInput, shapes: Shapes, seconds: float) -> list[Attempt]:
+    """As `nest_attempts`, for shapes that need not be facets; sizes are those of the input."""
+    margin = (wanted.size.sum(axis=1) * wanted.padding).sum()
+    area = float(shapes.area.sum() + margin)
+    narrowest = least_width(wanted)
+    shelves = [
+        Attempt(
+            partial(_shelves, shapes=shapes, rule=rule),
+            _shelf_seconds(shapes, rule),
+            area,
+            "shelves",
+            narrowest,
+        )
+        for rule in _RULES
+    ]
+    if len(wanted.size) > FEW:
+        return shelves
+    return [*shelves, *_mosaics(wanted, shapes, area, seconds)]
+
+
+def _shelves(wanted: PackInput, shapes: Shapes, rule: ShelfRule) -> PackResult:
+    return pack_shelves(wanted, shapes, rule)
+
+
+def _shelf_seconds(shapes: Shapes, rule: ShelfRule) -> float:
+    count, orientations = shapes.size.shape[:2]
+    height = float(shapes.size[:, :, 1].mean())
+    each = 40e-6 + rule.window * rule.levels * orientations * (20e-9 + 1e-9 * height)
+    return float(SLOW * count * each)
+
+
+def _mosaics(wanted: PackInput, shapes: Shapes, area: float, seconds: float) -> list[Attempt]:
+    """A first mosaic to try on many pages, then one improved for as long as there is time."""
+    side, narrowest = math.sqrt(area), least_width(wanted)
+    cell = _cell(side / 256, wanted.align)
+    # Measured on pages of 256 × 256 cells; on finer grids there are more rows and longer numbers.
+    once = SLOW * 2.2e-3 * math.sqrt(len(wanted.size)) * (side / cell / 256) ** 3 * shapes.size.shape[1] / 4
+    steps = int(_IMPROVING * seconds / once)
+    first, better = Mosaic(shapes, cell, 0), Mosaic(shapes, cell, steps)
+    return [
+        Attempt(first.run, once, area, "mosaic", narrowest),
+        Attempt(better.run, (steps + 1) * once, area, "mosaic", narrowest),
+    ]
+
+
+def _cell(pixels: float, align: int) -> int:
+    return max(align, round(pixels / align) * align)
