@@ -176,9 +176,8 @@ def test_no_hits_is_no_light():
 
 
 def test_light_from_behind_does_not_glint_where_a_normal_bends_past_the_silhouette():
-    scene = wall(
-        lights(sun=[(-0.05, 0, 1)], color=[(3, 3, 3)]), color=(1, 0.8, 0.4), metallic=1.0, roughness=0.3
-    )
+    behind = normalized(np.array([-0.05, 0, 1]))
+    scene = wall(lights(sun=[behind], color=[(3, 3, 3)]), color=(1, 0.8, 0.4), metallic=1.0, roughness=0.3)
     bent = normalized(np.array([0.3, 0.95, -0.05]))  # the triangle faces the eye, its normal just does not
     scene = replace(scene, normals=np.tile(np.float32(bent), (3, 1)))
     assert shade(scene, EYE, hits([[0.0], [0], [-2]])).max() < 0.5
