@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,10 +24,12 @@ from quiltcli.geometry import BoolArray, FloatArray, OwnerArray, dot
 from quiltcli.homography import quilt_rays
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
+from quiltcli.orders import DepthOrder, depth_order
 from quiltcli.packing import layout_for
 from quiltcli.raster import (
     Blocks,
     Frame,
+    Hits,
     Sight,
     batches,
     block_window,
@@ -229,6 +231,7 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
     Returns:
         How many pixels of facets, bleed left out, show the scene.
     """
+    frame = ordered(stage, frame)
     channels = stage.job.output.channels
     samples = stage.job.render.samples
     if samples > 1:
@@ -237,8 +240,29 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
     visible = 0
     for hits in rasterize(frame, batch):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
+        if frame.order is not None:
+            fill_stored(buffers, frame.order, hits)
         visible += hits.inside
     return visible
+
+
+def ordered(stage: Stage, frame: Frame) -> Frame:
+    """The frame with the depth buffer the job asks for; as it is where depth is exact."""
+    how = stage.job.render
+    if how.method == "homography" and how.depth_bits is None:
+        return frame
+    return replace(
+        frame, order=depth_order(how.method, how.depth_bits, frame.viewer, stage.facets, frame.rays)
+    )
+
+
+def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits) -> None:
+    """Write into `zv` what the depth buffer holds, and into `Z` the depth that it is taken for."""
+    wanted = [name for name in ("zv", "Z") if name in buffers]
+    if wanted:
+        stored = dict(zip(("zv", "Z"), order.stored(hits.facet, hits.position), strict=True))
+        for name in wanted:
+            buffers[name][hits.pixel] = stored[name]
 
 
 def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, samples: int) -> None:

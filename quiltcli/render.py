@@ -2,7 +2,7 @@
 
 job → display, layout, scene            once (`draw.set_stage`)
 frame → viewer                          a function of the frame number
-    bin, prewarp, rasterize, shade      `draw.draw_frame`
+    bin, prewarp, rasterize, shade      `draw.draw_frame`, or another of `methods`
     unmap, write                        `outputs.write_frame`
 """
 
@@ -20,12 +20,13 @@ import numpy as np
 
 from quiltcli import __version__
 from quiltcli.display import lit_facets, pitch_mm
-from quiltcli.draw import Buffers, Stage, default_threads, draw_frame, new_buffers, set_stage
+from quiltcli.draw import Buffers, Stage, default_threads, new_buffers, set_stage
 from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, raise_all
 from quiltcli.eyes import eye_problems
 from quiltcli.geometry import BoolArray
 from quiltcli.interrupt import stop_between_frames
 from quiltcli.job import JobFile, job_sha256
+from quiltcli.methods import draw_frame
 from quiltcli.outputs import (
     Outputs,
     frame_is_complete,

@@ -26,7 +26,7 @@ ORDER = (
         "progress",
         "diff",
     ),
-    *("draw", "pool", "outputs", "interrupt", "render"),
+    *("draw", "methods", "pool", "outputs", "interrupt", "render"),
     *("verify", "preview", "simulate", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
 )
 # The fast reader is built on the slow one's resolver, and taken by it where libyaml is there.

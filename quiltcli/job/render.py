@@ -24,11 +24,13 @@ from quiltcli.job.base import (
     YamlPath,
     complaint,
     describe,
+    either,
 )
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
-METHODS = ("homography",)
+METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
+DEPTH_BITS = ("16", "24", "32f")
 CHANNELS = ("rgba", "Z", "zv", "facet", "object", "triangle", "N", "P")
 COMPRESSIONS = (
     *("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256"),  # lossless
@@ -79,6 +81,13 @@ LayoutChoice: TypeAlias = Annotated[
 ]
 
 
+def _bits(value: Any) -> Any:
+    text = str(value) if isinstance(value, (int, str)) and not isinstance(value, bool) else value
+    if text is None or text in DEPTH_BITS:
+        return text
+    raise complaint(f"expected {either(DEPTH_BITS)}, or no such key, got {describe(value)}")
+
+
 class RenderSpec(Model):
     """How pixels are made."""
 
@@ -86,12 +95,23 @@ class RenderSpec(Model):
     """Samples a pixel; 1 is exactly the pixel's centre."""
     method: Annotated[str, OneOf(METHODS)] = "homography"
     """Render method."""
+    depth_bits: Annotated[
+        str | None, BeforeValidator(_bits), WithJsonSchema({"enum": [16, 24, "16", "24", "32f", None]})
+    ] = None
+    """Bits of an emulated GPU's depth buffer; exact depth when absent."""
     depth: Annotated[str, OneOf(("planar", "radial"))] = "planar"
     """Z along the look direction (planar) or the distance from the eye (radial)."""
     backface_culling: bool = False
     """Drop triangles that face away from the viewer."""
     bleed: Natural = 2
     """Pixels rendered past a facet's edge into the padding."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """Rays have neither a depth buffer nor several samples."""
+        if self.method == "raycast" and self.depth_bits is not None:
+            yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
+        if self.method == "raycast" and self.samples > 1:
+            yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
 
 
 class OutputSpec(Model):

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from quiltcli.camera import aimed, camera_display, frame_display
 from quiltcli.display import Facets
 from quiltcli.draw import Stage, default_threads, set_stage
 from quiltcli.errors import ViewerError, raise_all
 from quiltcli.geometry import Float32Array
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.preview import block_means
-from quiltcli.camera import aimed, camera_display, frame_display
 from quiltcli.simulate.compare import Comparison, compare, figures, heat_map, heat_scale, seam_pixels
 from quiltcli.simulate.images import shown_images
 from quiltcli.simulate.lookup import Shown

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.display import lit_facets
-from quiltcli.draw import Buffers, Stage, draw_frame, new_buffers
+from quiltcli.draw import Buffers, Stage, new_buffers
 from quiltcli.exr import facet_path, is_complete, quilt_path, read_exr
 from quiltcli.geometry import OwnerArray
 from quiltcli.layout import pixel_owners
+from quiltcli.methods import draw_frame
 from quiltcli.simulate.lookup import Shown
 from quiltcli.unmap import page_of, quilt_buffers
 from quiltcli.viewer import Viewer

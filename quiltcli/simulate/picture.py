@@ -46,8 +46,9 @@ def visible_facets(stage: Stage, camera: Viewer, through: Camera, threads: int) 
 
 
 def camera_stage(job: JobFile, through: Camera, scene: Scene) -> Stage:
-    """The stage of a picture: a scene behind the camera's one facet."""
-    return stage_of(job, *through, scene, bleed=0)
+    """The stage of a picture: a scene behind the camera's one facet, with exact depth."""
+    exact = job.render.model_copy(update={"method": "homography", "depth_bits": None})
+    return stage_of(job.model_copy(update={"render": exact}), *through, scene, bleed=0)
 
 
 def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:

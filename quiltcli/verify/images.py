@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.channels import empty_buffers
-from quiltcli.draw import Buffers, Stage, draw_frame
+from quiltcli.draw import Buffers, Stage
 from quiltcli.exr import is_complete, quilt_path
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.job import job_sha256
+from quiltcli.methods import draw_frame
 from quiltcli.outputs import outputs, read_quilt
 from quiltcli.viewer import Viewer
 
