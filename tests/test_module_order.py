@@ -27,7 +27,7 @@ ORDER = (
         "diff",
     ),
     *("draw", "methods", "pool", "outputs", "interrupt", "render"),
-    *("verify", "preview", "simulate", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
+    *("verify", "preview", "simulate", "view", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
 )
 # The fast reader is built on the slow one's resolver, and taken by it where libyaml is there.
 OPTIONAL = {("quiltcli.yamlsyntax", "quiltcli.yamlfast")}

@@ -1,4 +1,4 @@
-"""Commands to look and judge by: simulate, preview, sweetspot."""
+"""Commands to look and judge by: simulate, view, preview, sweetspot."""
 
 from __future__ import annotations
 
@@ -55,6 +55,32 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
     loaded = load_job(job, sets)
     for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures):
         click.echo(line)
+
+
+@main.command()
+@click.argument("out", type=PATH)
+@click.option("-f", "--frames", type=FRAMES, help="Frames such as 7 or 1-12; all that are there by default.")
+@click.option("-o", "--output", type=PATH, help="Page to write, as .html; OUT/view.html by default.")
+@click.option("--model/--no-model", default=True, help="Write a model beside it, as .glb.")
+@click.option("--filter", type=click.Choice(("nearest", "linear")), default="linear", show_default=True)
+@click.option("--errors", is_flag=True, help="Hold every frame against a direct picture, as a heat map.")
+@click.option("--ghost", type=click.IntRange(min=0), default=20000, show_default=True, metavar="TRIANGLES")
+@click.option("--texture", type=click.IntRange(64, 16384), default=4096, show_default=True, metavar="PIXELS")
+@click.option("--max-mb", "size", type=click.FloatRange(min=1), default=8.0, show_default=True)
+@click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")
+@click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
+def view(out: Path, frames: tuple[int, ...] | None, output: Path | None, **how: Any) -> None:
+    """Write a page to turn the display in the hands, from the output folder OUT of a render.
+
+    The page is one file that opens in any browser and needs no network: the display with its images on,
+    from the viewer's eye and from everywhere else, with the scene as a ghost of at most so many triangles.
+    """
+    from quiltcli.view import ViewOptions
+    from quiltcli.view import view as write_view
+
+    options = ViewOptions(nearest=how.pop("filter") == "nearest", **how)
+    for label, text in write_view(out, frames, output, options).lines:
+        click.echo(f"{label:<10}{text}")
 
 
 @main.command()
