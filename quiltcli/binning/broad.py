@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, normalized, segments
+from quiltcli.geometry import FloatArray, IntArray, dot, normalized, segments
 
 _CHUNK = 1 << 20
 _NEAR_PLANE = 1e-6
@@ -99,15 +99,16 @@ def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> IntA
 
 def footprints(polygons: FloatArray, frame: FloatArray) -> Footprints:
     """Rectangles of the polygons (N, n, 3) that may be seen through a face."""
-    x, y, w = dot(polygons, frame[0]), dot(polygons, frame[1]), dot(polygons, frame[2])
-    beside = (x > w).all(axis=1) | (-x > w).all(axis=1) | (y > w).all(axis=1) | (-y > w).all(axis=1)
-    index = np.flatnonzero((w > 0).any(axis=1) & ~beside)
-    x, y, w = x[index], y[index], w[index]
-    reach = np.abs(x) + np.abs(y) + np.abs(w)
-    front: BoolArray = np.all(w > _NEAR_PLANE * reach, axis=1)
-    safe = np.where(front[:, None], w, 1.0)
-    low = np.stack(((x / safe).min(axis=1), (y / safe).min(axis=1)), axis=1)
-    high = np.stack(((x / safe).max(axis=1), (y / safe).max(axis=1)), axis=1)
+    px, py, pz = np.ascontiguousarray(polygons.transpose(2, 1, 0))
+    x, y, w = (axis[0] * px + axis[1] * py + axis[2] * pz for axis in frame)  # (n, N): corners first
+    beside = (x > w).all(axis=0) | (-x > w).all(axis=0) | (y > w).all(axis=0) | (-y > w).all(axis=0)
+    index = np.flatnonzero((w > 0).any(axis=0) & ~beside)
+    x, y, w = x[:, index], y[:, index], w[:, index]
+    front = (w > _NEAR_PLANE * (np.abs(x) + np.abs(y) + np.abs(w))).all(axis=0)
+    safe = np.where(front, w, 1.0)
+    x, y = x / safe, y / safe
+    low = np.stack((x.min(axis=0), y.min(axis=0)), axis=1)
+    high = np.stack((x.max(axis=0), y.max(axis=0)), axis=1)
     low[~front], high[~front] = -1.0, 1.0
     seen = np.flatnonzero((low <= 1).all(axis=1) & (high >= -1).all(axis=1))
     return Footprints(index[seen], np.maximum(low[seen], -1.0), np.minimum(high[seen], 1.0))

@@ -21,6 +21,7 @@ from quiltcli.raster.hits import Hits
 from quiltcli.raster.keys import serial_bits
 from quiltcli.raster.large import draw_large
 from quiltcli.raster.order import BatchOrder
+from quiltcli.raster.planes import joined
 from quiltcli.raster.prewarp import BlockPairs, Sight, block_matrices, make_planes, split_pairs
 from quiltcli.raster.small import LIMIT, draw_small
 from quiltcli.raster.visibility import read_canvas
@@ -92,10 +93,12 @@ def rasterize(
     by = None if frame.order is None else BatchOrder(frame.order, limits, frame.blocks.facet[block])
     matrices = block_matrices(frame.rays, frame.blocks, block, sample)
     chunks = make_planes(frame.sight, frame.pairs, frame.blocks, block, matrices)
+    large = []
     for planes in chunks:
-        width = planes.box[1] - planes.box[0]
-        height = planes.box[3] - planes.box[2]
-        small = np.maximum(width, height) < LIMIT
-        draw_small(planes.take(np.flatnonzero(small)), canvas, limits, bits, by)
-        draw_large(planes.take(np.flatnonzero(~small)), canvas, limits, bits, by)
+        extent = np.maximum(planes.box[1] - planes.box[0], planes.box[3] - planes.box[2])
+        draw_small(planes, np.flatnonzero(extent < LIMIT), canvas, limits, bits, by)
+        large.append(planes.take(np.flatnonzero(extent >= LIMIT)))
+    if large:
+        # All at once: the more a tile has been offered, the more of it is known to be hidden.
+        draw_large(joined(large), canvas, limits, bits, by)
     yield from read_canvas(canvas, chunks, frame.blocks, rays, frame.owners, bits)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
 from quiltcli.raster.blocks import SIDE, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.keys import make_keys, serial_part
@@ -22,6 +22,7 @@ from quiltcli.raster.planes import Planes
 MICROTILE = 8
 TILE = 64
 _ROUND = 512
+_EARLY = 3
 _X: FloatArray = np.tile(np.arange(8.0), 8)
 _Y: FloatArray = np.repeat(np.arange(8.0), 8)
 _BASIS = np.stack((_X, _Y, np.ones(64)))
@@ -151,46 +152,82 @@ def _draw_rounds(
     tile = tile[order]
     fresh = np.flatnonzero(np.diff(tile, prepend=-1))
     rank = np.arange(tile.size) - np.repeat(fresh, np.diff(fresh, append=tile.size))
-    by_round = np.lexsort((spans.crossed[order], rank))
-    spans, tile, rank = spans.take(order[by_round]), tile[by_round], rank[by_round]
+    # Few spans are left after the first rounds: there one evaluation for all costs less than several.
+    crossed = spans.crossed[order]
+    kind = np.where(rank < _EARLY, crossed, np.minimum(crossed, 1))
+    by_round = np.lexsort((kind, rank))
+    tile, group = tile[by_round], (rank * 8 + kind)[by_round]
+    stack = _stack(planes, spans.take(order[by_round]))
     keys = canvas.keys.reshape(-1, 64)
-    bounds = np.flatnonzero(np.diff(rank * 8 + spans.crossed, prepend=-1, append=-1))
+    bounds = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
     for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
         for at in range(first, last, _ROUND):
-            part = np.arange(at, min(at + _ROUND, last))
-            drawn = _tile_keys(planes, spans.take(part), limits, bits, by)
+            part = slice(at, min(at + _ROUND, last))
             place = tile[part]
-            keys[place] = np.maximum(keys[place], drawn)
+            keys[place] = np.maximum(keys[place], _tile_keys(stack, part, limits, bits, by))
 
 
-def _tile_keys(
-    planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None
-) -> IntArray:
-    """Keys (S, 64) of microtiles that are all crossed by the same edges; negative where not covered."""
+@dataclass(frozen=True)
+class _Stack:
+    """What S microtiles need to be evaluated, in the order of the rounds.
+
+    Attributes:
+        local: (4, S, 3) planes of the three edges and of 1/t, from the microtile's first pixel.
+        low: (S, 1) least 1/t.
+        high: (S, 1) greatest 1/t.
+        serial: (S, 1) serial of the pair.
+        cut: (S, 1) pairs that reach beyond near or far.
+        block: (S, 1) place of the block in the batch.
+        spans: the microtiles.
+    """
+
+    local: FloatArray
+    low: FloatArray
+    high: FloatArray
+    serial: Int32Array
+    cut: BoolArray
+    block: Int32Array
+    spans: Spans
+
+
+def _stack(planes: Planes, spans: Spans) -> _Stack:
+    """Gather what the spans need, once for all rounds."""
     row = spans.row
-    inverse = _over_tile(planes.inverse, spans)
-    np.maximum(inverse, planes.low[row, None], out=inverse)
-    np.minimum(inverse, planes.high[row, None], out=inverse)
-    crossed = int(spans.crossed[0])
+    local = np.empty((4, row.size, 3))
+    for k, plane in enumerate((*planes.edge, planes.inverse)):
+        a, b = plane[0, row], plane[1, row]
+        local[k, :, 0], local[k, :, 1] = a, b
+        local[k, :, 2] = a * spans.x + b * spans.y + plane[2, row]
+    column = row[:, None]
+    return _Stack(
+        local=local,
+        low=planes.low[column],
+        high=planes.high[column],
+        serial=planes.serial[column],
+        cut=planes.cut[column],
+        block=planes.block[column],
+        spans=spans,
+    )
+
+
+def _tile_keys(stack: _Stack, part: slice, limits: DepthRange, bits: int, by: BatchOrder | None) -> IntArray:
+    """Keys (S, 64) of a slice of microtiles; negative where they are not covered."""
+    # Exact whatever the order of the sums: the planes lie on dyadic grids.
+    inverse: FloatArray = stack.local[3, part] @ _BASIS
+    np.maximum(inverse, stack.low[part], out=inverse)
+    np.minimum(inverse, stack.high[part], out=inverse)
+    crossed = int(np.bitwise_or.reduce(stack.spans.crossed[part]))
     inside = None
     for k in range(3):
         if crossed >> k & 1:
-            edge = _over_tile(planes.edge[k], spans)
+            edge = stack.local[k, part] @ _BASIS
             inside = edge if inside is None else np.minimum(inside, edge, out=inside)
-    if planes.cut[row].any():
-        block = planes.block[row, None]
-        kept = limits.keeps(block, spans.x[:, None] + _X, spans.y[:, None] + _Y, inverse)
-        np.negative(inverse, out=inverse, where=~kept & planes.cut[row, None])
+    x, y, cut = stack.spans.x[part, None] + _X, stack.spans.y[part, None] + _Y, stack.cut[part]
+    if cut.any():
+        kept = limits.keeps(stack.block[part], x, y, inverse)
+        np.negative(inverse, out=inverse, where=~kept & cut)
     if inside is not None:
         np.negative(inverse, out=inverse, where=(inside < 0) & (inverse > 0))
     if by is not None:
-        inverse = by.values(planes.block[row, None], spans.x[:, None] + _X, spans.y[:, None] + _Y, inverse)
-    return make_keys(inverse, serial_part(planes.serial[row, None], bits), bits)
-
-
-def _over_tile(plane: FloatArray, spans: Spans) -> FloatArray:
-    """Values (S, 64) of the spans' planes at the pixels of their microtiles, exact by construction."""
-    a, b, c = plane[0, spans.row], plane[1, spans.row], plane[2, spans.row]
-    local = np.stack((a, b, a * spans.x + b * spans.y + c), axis=1)
-    result: FloatArray = local @ _BASIS
-    return result
+        inverse = by.values(stack.block[part], x, y, inverse)
+    return make_keys(inverse, serial_part(stack.serial[part], bits), bits)

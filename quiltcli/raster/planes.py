@@ -9,7 +9,8 @@ then decide every pixel alike, and every machine computes the same bytes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -61,6 +62,12 @@ class Planes:
             box=np.take(self.box, rows, axis=1),
             cut=self.cut[rows],
         )
+
+
+def joined(parts: Sequence[Planes]) -> Planes:
+    """Several lists of pairs as one, in their order."""
+    columns = {field.name: [getattr(part, field.name) for part in parts] for field in fields(Planes)}
+    return Planes(**{name: np.concatenate(arrays, axis=-1) for name, arrays in columns.items()})
 
 
 def project(corners: FloatArray, matrix: FloatArray) -> FloatArray:

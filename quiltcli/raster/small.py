@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
 from quiltcli.raster.blocks import Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.keys import make_keys, serial_part
@@ -24,21 +24,27 @@ _CANDIDATES = 1 << 15
 _CLASS_OF = np.searchsorted(np.asarray(SIZES), np.arange(LIMIT + 1)).astype(np.uint16)
 
 
-def size_classes(planes: Planes) -> NDArray[np.uint16]:
-    """Class (N,) of every pair's box: shape and whether depth must be tested; boxes ≤ LIMIT only."""
-    width = planes.box[1] - planes.box[0] + 1
-    height = planes.box[3] - planes.box[2] + 1
-    classes: NDArray[np.uint16] = (_CLASS_OF[height] * len(SIZES) + _CLASS_OF[width]) * 2 + planes.cut
+def size_classes(box: Int32Array, cut: BoolArray) -> NDArray[np.uint16]:
+    """Class (N,) of every box (4, N): its shape, and whether depth must be tested; boxes ≤ LIMIT only."""
+    width = box[1] - box[0] + 1
+    height = box[3] - box[2] + 1
+    classes: NDArray[np.uint16] = (_CLASS_OF[height] * len(SIZES) + _CLASS_OF[width]) * 2 + cut
     return classes
 
 
 def draw_small(
-    planes: Planes, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None = None
+    planes: Planes,
+    rows: IntArray,
+    canvas: Canvas,
+    limits: DepthRange,
+    bits: int,
+    by: BatchOrder | None = None,
 ) -> int:
     """Draw pairs whose boxes are at most LIMIT pixels wide and high.
 
     Args:
-        planes: the pairs.
+        planes: pairs.
+        rows: those to draw.
         canvas: its keys are raised to the nearest surface.
         limits: near and far, for pairs that reach beyond them.
         bits: bits of the serial in a key.
@@ -47,13 +53,13 @@ def draw_small(
     Returns:
         Number of candidate pixels that were evaluated.
     """
-    classes = size_classes(planes)
+    classes = size_classes(planes.box[:, rows], planes.cut[rows])
     order = np.argsort(classes, kind="stable")
-    planes = planes.take(order)
-    bounds = np.flatnonzero(np.diff(classes[order], prepend=np.uint16(65535), append=np.uint16(65535)))
+    classes, planes = classes[order], planes.take(rows[order])
+    bounds = np.flatnonzero(np.diff(classes, prepend=np.uint16(65535), append=np.uint16(65535)))
     candidates = 0
     for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-        shape, cut = divmod(int(classes[order[first]]), 2)
+        shape, cut = divmod(int(classes[first]), 2)
         height, width = SIZES[shape // len(SIZES)], SIZES[shape % len(SIZES)]
         candidates += (last - first) * width * height
         for part in _slices(first, last, _CANDIDATES // (width * height)):
