@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from quiltcli.camera import aimed, camera_display, frame_display
 from quiltcli.display import lit_facets
 from quiltcli.errors import ViewerError
 from quiltcli.geometry import polygon_normal
 from quiltcli.homography import eye_from_quilt
 from quiltcli.layout import check_layout, pixel_owners
-from quiltcli.camera import aimed, camera_display, frame_display
 from quiltcli.viewer import Viewer
 
 

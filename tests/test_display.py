@@ -214,7 +214,9 @@ def test_lit_facets() -> None:
 def test_facet_from_world_inverts_the_raster() -> None:
     facets = facet(PANEL @ rotation_deg((20, 30, 40)).T)
     point = facets.origin[0] + 12.5 * facets.du[0] + 7.25 * facets.dv[0] + 3 * facets.normal[0]
-    np.testing.assert_allclose(facet_from_world(facets.origin, facets.du, facets.dv)[0] @ [*point, 1], [12.5, 7.25, 1], atol=1e-9)
+    np.testing.assert_allclose(
+        facet_from_world(facets.origin, facets.du, facets.dv)[0] @ [*point, 1], [12.5, 7.25, 1], atol=1e-9
+    )
 
 
 @st.composite

@@ -9,13 +9,13 @@ from click.testing import CliRunner
 from flatdisplays import flat_display, moved, placed, rectangle
 from PIL import Image
 
+from quiltcli.camera import camera_display
 from quiltcli.cli import main
 from quiltcli.draw import set_stage
 from quiltcli.job import load_job
 from quiltcli.layout import pixel_owners
 from quiltcli.render import render
 from quiltcli.simulate import PictureOptions, simulate
-from quiltcli.camera import camera_display
 from quiltcli.simulate.compare import compare, flip_map, heat_map, heat_scale, seam_pixels
 from quiltcli.simulate.images import shown_images
 from quiltcli.simulate.lookup import Shown, look_up, nearest_pixels, quilt_places

@@ -7,9 +7,9 @@ import pytest
 from quiltcli import exr, unmap
 from quiltcli.errors import OutputError
 from quiltcli.exr import facet_path, quilt_path, read_exr, write_exr
+from quiltcli.geometry import facet_from_world
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.unmap import facet_image, quilt_buffers
-from quiltcli.geometry import facet_from_world
 from quiltcli.unmapfiles import unmap as unmap_files
 
 TURNS = [
@@ -247,7 +247,10 @@ def test_the_map_from_the_world_finds_pixels():
 def test_the_map_from_the_world_copes_with_slanted_rasters():
     layout = single(np.eye(2, dtype=int))
     layout.dv[0] = [0.004, -0.02, 0.001]
-    i, j, w = facet_from_world(layout.origin, layout.du, layout.dv)[0] @ [*(layout.origin[0] + 3 * layout.du[0] + 2 * layout.dv[0]), 1]
+    i, j, w = facet_from_world(layout.origin, layout.du, layout.dv)[0] @ [
+        *(layout.origin[0] + 3 * layout.du[0] + 2 * layout.dv[0]),
+        1,
+    ]
     assert (i, j, w) == pytest.approx((3, 2, 1))
 
 
@@ -282,7 +285,9 @@ def test_quilt_files_become_facet_files(tmp_path):
         assert image.attributes["owner"] == "us"
         assert "quilt:page" not in image.attributes
         numbers = np.array(image.attributes["quilt:facet_from_world"].split(), dtype=float)
-        np.testing.assert_array_equal(facet_from_world(layout.origin, layout.du, layout.dv)[row].ravel(), numbers)
+        np.testing.assert_array_equal(
+            facet_from_world(layout.origin, layout.du, layout.dv)[row].ravel(), numbers
+        )
 
 
 def test_attributes_speak_where_names_do_not(tmp_path):
