@@ -9,7 +9,7 @@ SEEN := out/demo/pictures
 DOCS := docs/pictures
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo pictures test test-long lint types format bench golden clean
+.PHONY: help env demo pictures test test-long lint types format bench packing-table golden clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -69,6 +69,9 @@ format: env ## bring the code's layout in order
 
 bench: env ## render the demo's first frames and show the seconds of each stage
 	$(PY) -m quiltcli render scenes/demo.yaml --frames 1-3 --output out/bench --overwrite
+
+packing-table: env ## pack every display by every method and write the tables of docs/packing.md
+	$(PY) -m tests.benchmarks.packing --write docs/packing.md
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
 	$(PY) -m pytest tests/test_golden.py --update-golden

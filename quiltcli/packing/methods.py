@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import zip_longest
 
 from quiltcli.packing.attempt import Attempt, Method
 from quiltcli.packing.model import PackInput
@@ -14,10 +15,12 @@ _SPARSE = 0.7  # of its rectangles a display must fill for rectangles to have a 
 
 
 def auto_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
-    """All that `rects` and `nest` do; rectangles only for facets that nearly fill theirs."""
+    """All that `rects` and `nest` do, in turn; rectangles only for facets that nearly fill theirs."""
     nest = nest_attempts(wanted, seconds / 2)
     rects = rects_attempts(wanted, seconds / 2)
-    return [*rects, *nest] if nest[0].area > _SPARSE * rects[0].area else nest
+    if nest[0].area <= _SPARSE * rects[0].area:
+        return nest
+    return [attempt for both in zip_longest(rects, nest) for attempt in both if attempt is not None]
 
 
 METHODS: Mapping[str, Method] = {

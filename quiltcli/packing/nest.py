@@ -64,8 +64,10 @@ def _mosaics(wanted: PackInput, shapes: Shapes, area: float, seconds: float) -> 
     """A first mosaic to try on many pages, then one improved for as long as there is time."""
     side, narrowest = math.sqrt(area), least_width(wanted)
     cell = _cell(side / 256, wanted.align)
-    # Measured on pages of 256 × 256 cells; on finer grids there are more rows and longer numbers.
-    once = SLOW * 2.2e-3 * math.sqrt(len(wanted.size)) * (side / cell / 256) ** 3 * shapes.size.shape[1] / 4
+    # Every row of cells of every shape costs a few operations on numbers as long as the page is large.
+    count, grid = len(wanted.size), side / cell
+    rows = math.sqrt(count) * shapes.size.shape[1] * grid
+    once = SLOW * (rows * (1e-6 + 1.4e-6 * (grid / 256) ** 2) + 5e-5 * count)
     steps = int(_IMPROVING * seconds / once)
     first, better = Mosaic(shapes, cell, 0), Mosaic(shapes, cell, steps)
     return [

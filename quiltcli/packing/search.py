@@ -32,6 +32,7 @@ def best_pages(attempts: Sequence[Attempt], wanted: PackInput, seconds: float) -
     """
     best: tuple[tuple[int, int], PackResult] | None = None
     spent = 0.0
+    least = min(attempt.area for attempt in attempts) / (wanted.page[0] * wanted.page[1])
     for attempt in attempts:
         # Stopping, not skipping: more seconds then never lead to fewer attempts.
         if best is not None and spent + attempt.seconds > seconds:
@@ -41,7 +42,7 @@ def best_pages(attempts: Sequence[Attempt], wanted: PackInput, seconds: float) -
         cost = (page_count(result), used_height(wanted, result))
         if best is None or cost < best[0]:
             best = (cost, result)
-        if not wanted.begun and cost[0] <= attempt.area / (wanted.page[0] * wanted.page[1]) + 1:
+        if not wanted.begun and cost[0] <= least + 1:
             break
     assert best is not None
     return best[1]

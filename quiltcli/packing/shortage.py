@@ -12,7 +12,7 @@ from quiltcli.packing.model import PackInput, PackResult, page_count
 from quiltcli.packing.search import LARGEST_PAGE, best_pages
 from quiltcli.packing.target import Target
 
-_SHARE = 0.1  # of the time, for each try at another density or size
+_SHARE = 0.2  # of the time, for each try at another density or size
 
 
 def shortage(wanted: PackInput, result: PackResult, target: Target, size: tuple[int, int]) -> str:
