@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from quiltcli.errors import OutputError, Problem
-from quiltcli.frames import format_frames, frame_text
+from quiltcli.frames import format_frames
 from quiltcli.view.contents import display_name, page_data
 from quiltcli.view.fitting import fitting_pictures
 from quiltcli.view.folder import Folder, chosen_frames, open_folder
@@ -88,7 +88,7 @@ def _write_page(
 ) -> tuple[Coding, list[Picture]]:
     """Write the page; the coding of its pictures, and those of the first frame."""
     data = page_data(folder, mesh, seen, shade, options)
-    title = f"{display_name(folder)} · frame {frame_text(seen[0].viewer.frame)}"
+    title = f"{display_name(folder)} · frame {seen[0].viewer.frame}"
     room = options.size * 1e6 - len(page(title, data).encode())
     numbers = [frame.viewer.frame for frame in seen]
     coding, pictures = fitting_pictures(folder, numbers, options, room)

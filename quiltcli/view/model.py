@@ -59,10 +59,8 @@ def _display(gltf: Gltf, mesh: DisplayMesh, lit: BoolArray, pages: Sequence[Pict
     corner_page = np.repeat(mesh.page, np.diff(mesh.start))
     # A picture's first row is at v = 0 in this format, as in a quilt.
     uv = np.where(corner_page[:, None] >= 0, mesh.quilt / spans[corner_page], 0).astype(np.float32)
-    attributes = {
-        "POSITION": gltf.array(mesh.position, VERTICES, bounds=True),
-        "TEXCOORD_0": gltf.array(uv, VERTICES),
-    }
+    plain = {"POSITION": gltf.array(mesh.position, VERTICES, bounds=True)}
+    textured = {**plain, "TEXCOORD_0": gltf.array(uv, VERTICES)}
     shows = lit[mesh.facet]
     parts = []
     for page, picture in enumerate(pages):
@@ -72,12 +70,12 @@ def _display(gltf: Gltf, mesh: DisplayMesh, lit: BoolArray, pages: Sequence[Pict
             pbrMetallicRoughness={"baseColorTexture": {"index": texture}},
             doubleSided=mesh.both_sides,
         )
-        parts.append((mesh.triangles[shows & (mesh.page[mesh.facet] == page)], material))
+        parts.append((mesh.triangles[shows & (mesh.page[mesh.facet] == page)], textured, material))
     dark = gltf.unlit("dark", pbrMetallicRoughness={"baseColorFactor": _DARK}, doubleSided=True)
-    parts.append((mesh.triangles[~shows], dark))
+    parts.append((mesh.triangles[~shows], plain, dark))
     if not mesh.both_sides:
         back = gltf.unlit("back", pbrMetallicRoughness={"baseColorFactor": _DARK})
-        parts.append((mesh.triangles[shows][:, ::-1], back))
+        parts.append((mesh.triangles[shows][:, ::-1], plain, back))
     primitives = [
         {
             "attributes": attributes,
@@ -85,7 +83,7 @@ def _display(gltf: Gltf, mesh: DisplayMesh, lit: BoolArray, pages: Sequence[Pict
             "material": material,
             "mode": TRIANGLES,
         }
-        for triangles, material in parts
+        for triangles, attributes, material in parts
         if len(triangles)
     ]
     return gltf.add("meshes", name="display", primitives=primitives)
