@@ -1,4 +1,4 @@
-"""Commands to look and judge by: simulate, view, preview, sweetspot."""
+"""Commands to look and judge by: simulate, compare, view, preview, sweetspot."""
 
 from __future__ import annotations
 
@@ -55,6 +55,43 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
     loaded = load_job(job, sets)
     for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures):
         click.echo(line)
+
+
+@main.command()
+@click.argument("job", type=PATH)
+@click.option("-f", "--frame", type=int, help="The frame; the job's first by default.")
+@click.option("-o", "--output", type=PATH, help="Folder to write to; compare in the job's by default.")
+@click.option("--method", "methods", multiple=True, help="Only this method; may be given again.")
+@click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
+@click.option(
+    "--set", "sets", metavar="KEY=VALUE", multiple=True, help="Set a value of the job, by dotted path."
+)
+def compare(
+    job: Path,
+    frame: int | None,
+    output: Path | None,
+    methods: tuple[str, ...],
+    threads: int | None,
+    sets: tuple[str, ...],
+) -> None:
+    """Draw a frame of JOB by every render method and hold each against rays.
+
+    Writes a page with figures, charts and close views, and the same as JSON; a table goes to stdout.
+    """
+    from quiltcli.compare import COLUMNS, CompareOptions, study_rows, variants_of
+    from quiltcli.compare import compare as compare_methods
+    from quiltcli.compare.page import write_comparison
+    from quiltcli.job import load_job
+
+    loaded = load_job(job, sets)
+    options = CompareOptions(
+        frame, variants_of(methods), threads or 0, lambda name: click.echo(f"drawing {name}", err=True)
+    )
+    study = compare_methods(loaded, options)
+    paths = write_comparison(study, output or loaded.output.directory / "compare")
+    print_aligned(COLUMNS, study_rows(study))
+    for path in paths:
+        click.echo(f"written to {path}")
 
 
 @main.command()
