@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem
 from quiltcli.exr import Image, frame_digits, read_parts
+from quiltcli.exrwindow import whole_frame
 from quiltcli.geometry import BoolArray
 
 MATCH, WARN, FAIL, SIZE, FILE = 0, 1, 2, 3, 4
@@ -154,7 +155,7 @@ def diff_files(a: Path, b: Path, limits: Limits | None = None, *, name: str = ""
         return FileDiff(name, SIZE, wrong, ())
     code, channels = MATCH, []
     for part, (image_a, image_b) in enumerate(zip(parts_a, parts_b, strict=True)):
-        verdict, rows = diff_channels(image_a.channels, image_b.channels, limits, part)
+        verdict, rows = diff_channels(*_same_window(image_a, image_b), limits, part)
         code = max(code, verdict)
         channels += rows
     return FileDiff(name, code, "", tuple(channels))
@@ -168,9 +169,16 @@ def _shape_difference(a: Sequence[Image], b: Sequence[Image]) -> str:
         if image_a.channels.keys() != image_b.channels.keys():
             names = (", ".join(sorted(image.channels)) for image in (image_a, image_b))
             return "channels {} against {}".format(*names)
-        if image_a.data_window != image_b.data_window:
+        if image_a.data_window != image_b.data_window and image_a.display_window != image_b.display_window:
             return f"pixels {_bounds(image_a)} against {_bounds(image_b)}"
     return ""
+
+
+def _same_window(a: Image, b: Image) -> tuple[Mapping[str, NDArray[Any]], Mapping[str, NDArray[Any]]]:
+    """The channels of two images over one window: that of the pixels, else the whole frame."""
+    if a.data_window == b.data_window:
+        return a.channels, b.channels
+    return whole_frame(a), whole_frame(b)
 
 
 def _bounds(image: Image) -> str:

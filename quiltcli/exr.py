@@ -77,6 +77,16 @@ def compression_constant(name: str) -> Any:
     return known[name.lower()]
 
 
+def use_threads(count: int) -> None:
+    """Let the library compress with so many threads; it has none of its own accord.
+
+    The bytes do not depend on it. They are threads of this process: fork before, not after.
+    """
+    count = count if count > 1 else 0
+    if OpenEXR.global_thread_count() != count:
+        OpenEXR.set_global_thread_count(count)
+
+
 def write_exr(
     path: Path,
     channels: Mapping[str, Channel],

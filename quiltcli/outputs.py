@@ -6,13 +6,16 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.draw import Buffers, Stage
+from quiltcli.display import lit_facets
+from quiltcli.draw import Buffers, Clock, Stage
 from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.exr import (
+    Channel,
     facet_attributes,
     facet_path,
     frame_attributes,
@@ -22,12 +25,13 @@ from quiltcli.exr import (
     read_header,
     write_exr,
 )
+from quiltcli.exrwindow import cropped, frame_size, tight_window, whole_frame
 from quiltcli.geometry import IntArray, facet_from_world
 from quiltcli.job import dump_job
-from quiltcli.layout import write_layout
+from quiltcli.layout import Layout, write_layout
 from quiltcli.unmap import facet_image, page_of
-from quiltcli.viewer import Viewer
-from quiltcli.wholefile import make_folder, write_text
+from quiltcli.viewer import Viewer, viewer_at
+from quiltcli.wholefile import link_whole, make_folder, remove_file, write_text
 
 
 @dataclass(frozen=True)
@@ -62,8 +66,20 @@ def frame_files(stage: Stage, out: Outputs, frame: int) -> list[Path]:
 
 
 def frame_is_complete(stage: Stage, out: Outputs, frame: int) -> bool:
-    """Whether every image of a frame is there, whole, and made by this job."""
-    return all(is_complete(path, out.job_sha, frame) for path in frame_files(stage, out, frame))
+    """Whether every image of a frame is there, whole, and made by this job; one to be skipped may lack."""
+    missing = set(_skipped_files(stage, out, frame))
+    return all(
+        is_complete(path, out.job_sha, frame) or (path in missing and not path.exists())
+        for path in frame_files(stage, out, frame)
+    )
+
+
+def _skipped_files(stage: Stage, out: Outputs, frame: int) -> Iterator[Path]:
+    """Images of a frame that are not to be written, for their facets are not lit."""
+    if stage.job.output.facets and stage.job.output.unlit == "skip":
+        eye = viewer_at(stage.job.viewer, frame).eye
+        for row in out.rows[~lit_facets(stage.facets, eye)[out.rows]]:
+            yield facet_path(out.folder, int(stage.layout.facet[row]), frame)
 
 
 def refuse_to_overwrite(stage: Stage, out: Outputs, frames: Iterable[int]) -> None:
@@ -84,51 +100,117 @@ def write_settings(stage: Stage, out: Outputs) -> None:
     write_text(out.folder / "job.yaml", dump_job(stage.job, out.folder))
 
 
-def write_frame(stage: Stage, out: Outputs, viewer: Viewer, buffers: Buffers, threads: int) -> None:
+def write_frame(
+    stage: Stage, out: Outputs, viewer: Viewer, buffers: Buffers, threads: int
+) -> dict[str, float]:
     """Write the images of one frame, several files at a time.
+
+    Returns:
+        Seconds by what was done, those of all threads together.
 
     Raises:
         OutputError: a file cannot be written; those already written are whole.
     """
     attributes = frame_attributes(viewer, stage.job.fps, out.job_sha, __version__)
+    total: dict[str, float] = {}
     with ThreadPoolExecutor(threads) as pool:
-        written = []
-        if stage.job.output.quilts:
-            pages = range(len(stage.layout.pages))
-            written += [pool.submit(_write_page, stage, out, page, buffers, attributes) for page in pages]
-        if stage.job.output.facets:
-            maps = facet_from_world(stage.layout.origin, stage.layout.du, stage.layout.dv)
-            written += [
-                pool.submit(
-                    _write_facet,
-                    stage,
-                    out,
-                    row,
-                    buffers,
-                    attributes | facet_attributes(int(stage.layout.facet[row]), maps[row]),
-                )
-                for row in out.rows.tolist()
-            ]
-        for each in written:
-            each.result()
+        work = _work(stage, out, viewer, buffers, attributes)
+        for each in [pool.submit(*task) for task in work]:
+            for name, seconds in each.result().items():
+                total[name] = total.get(name, 0.0) + seconds
+    return total
+
+
+def _work(
+    stage: Stage, out: Outputs, viewer: Viewer, buffers: Buffers, attributes: dict[str, object]
+) -> Iterator[tuple[Any, ...]]:
+    """What there is to do for one frame: functions that give seconds, and their arguments."""
+    how, layout = stage.job.output, stage.layout
+    if how.quilts:
+        for page in range(len(layout.pages)):
+            yield _write_page, stage, out, page, buffers, attributes
+    if not how.facets:
+        return
+    maps = facet_from_world(layout.origin, layout.du, layout.dv)
+    apart = ~lit_facets(stage.facets, viewer.eye)[out.rows] & (how.unlit != "write")
+    for row in out.rows[~apart].tolist():
+        own = attributes | facet_attributes(int(layout.facet[row]), maps[row])
+        yield _write_facet, stage, out, row, buffers, own
+    if apart.any():
+        for rows in _by_size(layout, out.rows[apart]):
+            paths = [facet_path(out.folder, int(layout.facet[row]), viewer.frame) for row in rows]
+            if how.unlit == "skip":
+                yield _remove, paths
+            else:
+                yield _write_links, stage, rows[0], buffers, attributes, paths
+
+
+def _by_size(layout: Layout, rows: IntArray) -> Iterator[list[int]]:
+    """The rows in groups of one raster size."""
+    _, group = np.unique(layout.size[rows], axis=0, return_inverse=True)
+    for number in range(int(group.max()) + 1):
+        yield rows[group.reshape(-1) == number].tolist()
 
 
 def _write_page(
     stage: Stage, out: Outputs, page: int, buffers: Buffers, attributes: dict[str, object]
-) -> None:
+) -> dict[str, float]:
     """Write one page of the quilt."""
+    clock = Clock()
     pixels = {name: page_of(flat, stage.layout, page) for name, flat in buffers.items()}
     path = quilt_path(out.folder, page + 1, int(str(attributes["quilt:frame"])))
-    write_exr(path, pixels, attributes | {"quilt:page": page + 1}, stage.job.output.compression)
+    _write(stage, path, pixels, attributes | {"quilt:page": page + 1}, clock)
+    return clock.seconds
 
 
 def _write_facet(
     stage: Stage, out: Outputs, row: int, buffers: Buffers, attributes: dict[str, object]
-) -> None:
+) -> dict[str, float]:
     """Write the image of one facet."""
-    pixels = facet_image(buffers, stage.layout, row, stage.owners)
+    clock = Clock()
+    with clock.stage("cut"):
+        pixels = facet_image(buffers, stage.layout, row, stage.owners)
     path = facet_path(out.folder, int(stage.layout.facet[row]), int(str(attributes["quilt:frame"])))
-    write_exr(path, pixels, attributes, stage.job.output.compression)
+    _write(stage, path, pixels, attributes, clock)
+    return clock.seconds
+
+
+def _write_links(
+    stage: Stage, row: int, buffers: Buffers, attributes: dict[str, object], paths: list[Path]
+) -> dict[str, float]:
+    """Write one image for facets of one size that show nothing, and link it to the names of them all."""
+    clock = Clock()
+    with clock.stage("cut"):
+        pixels = facet_image(buffers, stage.layout, row, stage.owners)
+    _write(stage, paths[0], pixels, attributes, clock)
+    with clock.stage("link"):
+        for path in paths[1:]:
+            link_whole(paths[0], path)
+    return clock.seconds
+
+
+def _remove(paths: list[Path]) -> dict[str, float]:
+    """Remove images that an earlier render has left of facets that are now skipped."""
+    clock = Clock()
+    with clock.stage("link"):
+        for path in paths:
+            remove_file(path)
+    return clock.seconds
+
+
+def _write(
+    stage: Stage, path: Path, pixels: dict[str, Channel], attributes: dict[str, object], clock: Clock
+) -> None:
+    """Write one image as the job wants it."""
+    how = stage.job.output
+    height, width = next(iter(pixels.values())).shape
+    frame = window = (0, 0), (width - 1, height - 1)
+    if how.data_window == "tight":
+        with clock.stage("tighten"):
+            window = tight_window(pixels)
+            pixels = cropped(pixels, window)
+    with clock.stage("compress and store"):
+        write_exr(path, pixels, attributes, how.compression, data_window=window, display_window=frame)
 
 
 def merge_problems(stage: Stage, out: Outputs, frames: Iterable[int]) -> list[Problem]:
@@ -148,8 +230,9 @@ def read_quilt(stage: Stage, out: Outputs, frame: int, buffers: Buffers) -> None
         image = read_exr(path)
         if missing := sorted(set(buffers) - set(image.channels)):
             raise OutputError(Problem(f"lacks the channels {', '.join(missing)}", str(path)))
+        channels = whole_frame(image)
         for name in buffers:
-            page_of(buffers[name], stage.layout, page)[:] = image.channels[name]
+            page_of(buffers[name], stage.layout, page)[:] = channels[name]
 
 
 def _pages_on_disk(stage: Stage, out: Outputs, frame: int) -> Iterator[tuple[int, Problem | None]]:
@@ -163,7 +246,7 @@ def _pages_on_disk(stage: Stage, out: Outputs, frame: int) -> Iterator[tuple[int
             )
             continue
         image = read_header(path)
-        size = tuple(np.subtract(image.display_window[1], image.display_window[0]) + 1)
+        size = frame_size(image)
         if size != (width, height):
             words = f"is {size[0]}×{size[1]} pixels, the layout's page is {width}×{height}"
             yield page, Problem(words, str(path))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem
 from quiltcli.exr import read_exr
+from quiltcli.exrwindow import whole_frame
 from quiltcli.geometry import Float32Array
 from quiltcli.wholefile import make_folder, whole_file
 
@@ -130,7 +131,7 @@ def preview(image: Path, picture: Path, view: str = "aces", exposure: float = 0.
     Raises:
         OutputError: the image cannot be read or has no colours, or the picture cannot be written.
     """
-    channels = read_exr(image).channels
+    channels = whole_frame(read_exr(image))
     if missing := [name for name in "RGB" if name not in channels]:
         have = ", ".join(channels)
         wrong = f"has no channel {missing[0]}, expected R, G and B (it has {have})"

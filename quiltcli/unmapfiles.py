@@ -6,10 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.exr import (
@@ -21,9 +19,10 @@ from quiltcli.exr import (
     read_header,
     write_exr,
 )
+from quiltcli.exrwindow import frame_size, whole_frame
 from quiltcli.geometry import facet_from_world
 from quiltcli.layout import Layout, pixel_owners
-from quiltcli.unmap import BACKGROUND, Channel, cut_facet, page_of
+from quiltcli.unmap import BACKGROUND, cut_facet, page_of
 from quiltcli.wholefile import make_folder
 
 _FRAME = re.compile(r".*\.(-?\d+)")
@@ -71,7 +70,7 @@ def unmap(
     written = []
     for file in files:
         image = read_exr(file.path)
-        pixels = _page_pixels(image, layout.pages[file.page], background)
+        pixels = whole_frame(image, background)
         page_owners = page_of(owners, layout, file.page)
         shared = {name: value for name, value in image.attributes.items() if name != "quilt:page"}
         for row in np.flatnonzero(layout.page == file.page):
@@ -110,10 +109,10 @@ def _identified(path: Path, layout: Layout) -> QuiltFile:
         raise OutputError(
             Problem(f"is page {page}, the layout has pages 1–{len(layout.pages)}", file=str(path))
         )
-    (x0, y0), (x1, y1) = header.display_window
+    size = frame_size(header)
     width, height = layout.pages[page - 1]
-    if (x1 - x0 + 1, y1 - y0 + 1) != (width, height):
-        wrong = f"is {x1 - x0 + 1}×{y1 - y0 + 1} pixels, page {page} of the layout is {width}×{height}"
+    if size != (width, height):
+        wrong = f"is {size[0]}×{size[1]} pixels, page {page} of the layout is {width}×{height}"
         raise OutputError(Problem(wrong, file=str(path)))
     return QuiltFile(path, page - 1, frame)
 
@@ -145,22 +144,3 @@ def _in_the_way(files: Sequence[QuiltFile], layout: Layout, out: Path) -> Iterat
             if path.exists():
                 yield Problem("exists already, expected to be told to overwrite it", file=str(path))
                 return
-
-
-def _page_pixels(
-    image: Image, size: NDArray[np.int32], background: Mapping[str, float]
-) -> Mapping[str, Channel]:
-    """Channels over the whole page: compositing programs crop the data window to what is not black."""
-    if image.data_window == image.display_window:
-        return image.channels
-    (fx, fy), _ = image.display_window
-    (x0, y0), (x1, y1) = image.data_window
-    left, top = max(x0 - fx, 0), max(y0 - fy, 0)
-    right, bottom = min(x1 - fx + 1, int(size[0])), min(y1 - fy + 1, int(size[1]))
-    whole: dict[str, NDArray[Any]] = {}
-    for name, channel in image.channels.items():
-        whole[name] = np.full((size[1], size[0]), background.get(name, 0), channel.dtype)
-        if left < right and top < bottom:
-            data = channel[top + fy - y0 : bottom + fy - y0, left + fx - x0 : right + fx - x0]
-            whole[name][top:bottom, left:right] = data
-    return whole

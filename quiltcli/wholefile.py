@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -57,6 +58,24 @@ def write_text(path: Path, text: str) -> None:
     """Write `text` as UTF-8 with bare newlines, whole or not at all (OutputError)."""
     with whole_file(path) as temporary:
         temporary.write_bytes(text.encode())
+
+
+def link_whole(source: Path, path: Path) -> None:
+    """Make `path` the same file as `source`, by a hard link; a copy where there can be none (OutputError)."""
+    with whole_file(path) as temporary:
+        try:
+            os.link(source, temporary)
+        except OSError:  # another kind of file system, or one that has enough links to this file
+            shutil.copyfile(source, temporary)
+
+
+def remove_file(path: Path) -> None:
+    """Remove a file; do nothing when there is none (OutputError)."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        words = f"cannot be removed: {error.strerror}"
+        raise OutputError(Problem(words, file=str(path))) from error
 
 
 def make_folder(path: Path) -> None:

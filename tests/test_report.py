@@ -17,6 +17,7 @@ def record(frame, **changes):
     record = FrameRecord(
         frame=frame,
         triangles=1000 * (frame + 10),
+        reaching=1000 * (frame + 10),
         pairs=1100 * (frame + 10),
         settled=800 * (frame + 10),
         lit_facets=420 + frame,
@@ -45,6 +46,7 @@ def test_a_report_says_what_made_it_and_how(tmp_path):
             {
                 "frame": 3,
                 "triangles": 13000,
+                "reaching": 13000,
                 "pairs": 14300,
                 "settled": 10400,
                 "lit_facets": 423,
@@ -130,7 +132,7 @@ def test_a_report_that_cannot_be_written(tmp_path):
 
 
 def test_shares_of_an_empty_scene():
-    empty = record(1, triangles=0, pairs=0, settled=0)
+    empty = record(1, triangles=0, reaching=0, pairs=0, settled=0)
     assert empty.settled_share == 1.0
     assert empty.replication == 0.0
 

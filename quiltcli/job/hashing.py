@@ -21,8 +21,8 @@ def job_sha256(job: JobFile) -> str:
     """Hash of what makes the pixels of a job's frames, hexadecimal.
 
     Files count by their contents, not by their names: a moved folder keeps its hash and an edited
-    mesh changes it. Which frames are rendered, where to, and whether as quilts or facet images,
-    makes no difference to any pixel and is left out.
+    mesh changes it. Which frames are rendered, where to, whether as quilts or facet images, and what
+    becomes of facets that are not lit, makes no difference to any pixel and is left out.
     """
     data = plain(job, file_sha256)
     data["display"] = plain(load_display_file(job.display), file_sha256)
@@ -32,7 +32,7 @@ def job_sha256(job: JobFile) -> str:
     elif isinstance(job.layout, PackSpec) and job.layout.pins is not None:
         data["layout"]["pins"] = _places(job.layout.pins)
     del data["frames"]
-    data["output"] = {key: data["output"][key] for key in ("channels", "compression")}
+    data["output"] = {key: data["output"][key] for key in ("channels", "compression", "data_window")}
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 

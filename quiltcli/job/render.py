@@ -36,6 +36,8 @@ COMPRESSIONS = (
     *("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256"),  # lossless
     *("pxr24", "b44", "b44a", "dwaa", "dwab"),  # lossy
 )
+UNLIT = ("write", "link", "skip")
+DATA_WINDOWS = ("full", "tight")
 # Decimal rates that stand for fractions in film and television.
 _NTSC = {23.98: 24, 23.976: 24, 29.97: 30, 47.95: 48, 47.952: 48, 59.94: 60, 119.88: 120}
 
@@ -130,6 +132,10 @@ class OutputSpec(Model):
     """Channels of every image."""
     compression: Annotated[str, OneOf(COMPRESSIONS)] = "zip"
     """OpenEXR compression."""
+    unlit: Annotated[str, OneOf(UNLIT)] = "write"
+    """Images of facets that face away from the viewer: written, hard links to one of their size, or none."""
+    data_window: Annotated[str, OneOf(DATA_WINDOWS)] = "full"
+    """Pixels in a file: all of the page or facet, or no margins that show nothing (tight)."""
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Something is written, and nothing twice."""

@@ -9,7 +9,8 @@ import numpy as np
 from quiltcli.display import lit_facets
 from quiltcli.draw import Buffers, Stage, new_buffers
 from quiltcli.exr import facet_path, is_complete, quilt_path, read_exr
-from quiltcli.geometry import OwnerArray
+from quiltcli.exrwindow import whole_frame
+from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.layout import pixel_owners
 from quiltcli.methods import draw_frame
 from quiltcli.simulate.lookup import Shown
@@ -35,7 +36,7 @@ def shown_images(stage: Stage, viewer: Viewer, folder: Path, job_sha: str, threa
     owners: OwnerArray = stage.owners
     if (buffers := _quilts(stage, viewer.frame, folder, job_sha)) is not None:
         source = f"read from {folder / 'quilt'}"
-    elif (buffers := _facets(stage, viewer.frame, folder, job_sha)) is not None:
+    elif (buffers := _facets(stage, lit, viewer.frame, folder, job_sha)) is not None:
         source = f"read from {folder / 'facets'}"
         owners = pixel_owners(stage.layout)  # a facet's image ends at its polygon
     else:
@@ -51,7 +52,7 @@ def _quilts(stage: Stage, frame: int, folder: Path, job_sha: str) -> Buffers | N
         return None
     buffers = {name: np.zeros(stage.owners.size, dtype=np.float16) for name in "RGB"}
     for page, path in enumerate(paths):
-        channels = read_exr(path).channels
+        channels = whole_frame(read_exr(path))
         if any(name not in channels for name in "RGB"):
             return None
         for name, flat in buffers.items():
@@ -59,15 +60,15 @@ def _quilts(stage: Stage, frame: int, folder: Path, job_sha: str) -> Buffers | N
     return buffers
 
 
-def _facets(stage: Stage, frame: int, folder: Path, job_sha: str) -> Buffers | None:
-    """The quilt put together from the facets' images on disk, None where one is missing."""
-    rows = np.flatnonzero(stage.layout.page >= 0).tolist()
+def _facets(stage: Stage, lit: BoolArray, frame: int, folder: Path, job_sha: str) -> Buffers | None:
+    """The quilt put together from the lit facets' images on disk, None where one is missing."""
+    rows = np.flatnonzero(lit).tolist()
     paths = {row: facet_path(folder, int(stage.layout.facet[row]), frame) for row in rows}
-    if not all(is_complete(path, job_sha, frame) for path in paths.values()):
+    if not paths or not all(is_complete(path, job_sha, frame) for path in paths.values()):
         return None
     images = {}
     for row, path in paths.items():
-        channels = read_exr(path).channels
+        channels = whole_frame(read_exr(path))
         if any(name not in channels for name in "RGB"):
             return None
         images[row] = {name: channels[name] for name in "RGB"}
