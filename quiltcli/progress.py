@@ -79,7 +79,7 @@ def _bar(stream: TextIO) -> Iterator[Progress]:
 
 def frame_line(record: FrameRecord) -> str:
     """A frame in a few words."""
-    seconds = sum(record.seconds.values())
+    seconds = record.total_seconds
     words = f"{seconds:.2f} s, {record.lit_facets:,} lit facets, {record.visible_pixels:,} pixels"
     if record.warnings:
         words += f", {len(record.warnings)} warning" + ("s" if len(record.warnings) > 1 else "")

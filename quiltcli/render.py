@@ -8,6 +8,7 @@ frame → viewer                          a function of the frame number
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -22,6 +23,7 @@ from quiltcli import __version__
 from quiltcli.display import lit_facets, pitch_mm
 from quiltcli.draw import Buffers, Stage, default_threads, new_buffers, set_stage
 from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, raise_all
+from quiltcli.exr import use_threads
 from quiltcli.eyes import eye_problems
 from quiltcli.geometry import BoolArray
 from quiltcli.interrupt import stop_between_frames
@@ -37,7 +39,7 @@ from quiltcli.outputs import (
     write_frame,
     write_settings,
 )
-from quiltcli.pool import Pool, can_fork, shared_buffers
+from quiltcli.pool import Pool, can_fork, shared_buffers, worth_forking
 from quiltcli.report import FrameRecord, write_report
 from quiltcli.viewer import Viewer, check_viewer, viewer_at
 
@@ -115,13 +117,14 @@ def render(
         Stopped: a signal came; the frames rendered so far are whole and reported.
     """
     options, listener = options or RenderOptions(), listener or Listener()
+    start = time.perf_counter()
     ready = prepare(job, options)
     for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
         listener.say(notice)
     if options.dry_run or not ready.viewers:
         return []
     write_settings(ready.stage, ready.out)
-    return render_frames(ready, options.threads or default_threads(), listener)
+    return render_frames(ready, options.threads or default_threads(), listener, start)
 
 
 def prepare(job: JobFile, options: RenderOptions) -> Prepared:
@@ -145,17 +148,26 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
     return Prepared(stage, out, tuple(viewers), only)
 
 
-def render_frames(ready: Prepared, threads: int, listener: Listener) -> list[FrameRecord]:
-    """Draw and write the frames; while one is written, the next is drawn into other buffers."""
+def render_frames(
+    ready: Prepared, threads: int, listener: Listener, start: float | None = None
+) -> list[FrameRecord]:
+    """Draw and write the frames; while one is written, the next is drawn into other buffers.
+
+    Args:
+        ready: what to draw.
+        threads: batches and files worked on at a time.
+        listener: told of every finished frame.
+        start: when the run began, by `time.perf_counter`; None for now.
+    """
     stage, viewers = ready.stage, ready.viewers
-    pooled = threads > 1 and can_fork()
+    pooled = threads > 1 and can_fork() and worth_forking(stage)
     sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in viewers[:2]]
     # Forked before this process has threads of its own: a lock that one holds would stay locked.
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, sheets, threads)) if pooled else None
         listener.begin(len(viewers))
         request = ends.enter_context(stop_between_frames())
-        writer = ends.enter_context(Writer(ready, threads, listener))
+        writer = ends.enter_context(Writer(ready, threads, listener, start))
         dirty = [np.zeros(stage.facets.count, dtype=np.bool_) for _ in sheets]
         for number, viewer in enumerate(viewers):
             request.check()
@@ -179,7 +191,11 @@ class Writer:
         records: of the frames whose files are all there.
     """
 
-    def __init__(self, ready: Prepared, threads: int, listener: Listener) -> None:
+    def __init__(self, ready: Prepared, threads: int, listener: Listener, start: float | None = None) -> None:
+        now = time.perf_counter()
+        self._done = now if start is None else start  # when the frame before was
+        self._load = now - self._done
+        use_threads(threads)
         self.records: list[FrameRecord] = []
         self._ready = ready
         self._threads = threads
@@ -203,12 +219,18 @@ class Writer:
         """Write a frame; its buffers must not change until `leave` has let it go."""
         stage, out = self._ready.stage, self._ready.out
         work = partial(write_frame, stage, out, viewer, buffers, self._threads)
-        self._waiting.append(self._executor.submit(record.timed, "write", work))
+        record = record.after("load", self._load)
+        self._load = 0.0
+        self._waiting.append(self._executor.submit(record.written, work))
 
     def leave(self, count: int) -> None:
         """Wait until at most `count` frames are unwritten; report those that are."""
         while len(self._waiting) > count:
+            start = time.perf_counter()
             record = self._waiting.popleft().result()
+            now = time.perf_counter()
+            record = record.done(waited=now - start, wall=now - self._done)
+            self._done = now
             self.records.append(record)
             out = self._ready.out
             write_report(out.folder / "report.json", out.job_sha, __version__, [record])

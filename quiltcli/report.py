@@ -33,7 +33,11 @@ class FrameRecord:
         lit_facets: facets whose lit side faces the eye.
         visible_pixels: quilt pixels inside facets that show the scene.
         fill: share of the quilt's pixels that lie inside facets, 0 to 1.
-        seconds: wall time by stage, in the order of the stages.
+        seconds: wall time by stage, in the order of the stages: `load` what all frames share, in the
+            first; those of drawing; `write`, while the next frame is drawn; `wait`, what drawing waited
+            for that.
+        wall_seconds: from the end of the frame before to the end of this one: the frames' sum is the run's.
+        write_seconds: time in the writer's threads, all together, by what they did.
         warnings: sentences for the user.
     """
 
@@ -46,6 +50,8 @@ class FrameRecord:
     visible_pixels: int
     fill: float
     seconds: Mapping[str, float] = field(default_factory=dict)
+    wall_seconds: float = 0.0
+    write_seconds: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     @property
@@ -58,18 +64,33 @@ class FrameRecord:
         """Pairs per triangle that reaches a facet (0 if none does)."""
         return self.pairs / self.reaching if self.reaching else 0.0
 
-    def timed(self, stage: str, work: Callable[[], object]) -> FrameRecord:
-        """Do `work`; the record with the time it took under `stage`."""
+    @property
+    def total_seconds(self) -> float:
+        """Wall time of the frame; of all its stages where nobody has looked at the clock."""
+        return self.wall_seconds or sum(self.seconds.values())
+
+    def after(self, stage: str, seconds: float) -> FrameRecord:
+        """The record with a stage before all others, if it took any time."""
+        return replace(self, seconds={stage: seconds, **self.seconds}) if seconds else self
+
+    def written(self, write: Callable[[], Mapping[str, float]]) -> FrameRecord:
+        """Do `write`, which tells seconds by what it did; the record with the time it took."""
         start = time.perf_counter()
-        work()
-        return replace(self, seconds={**self.seconds, stage: time.perf_counter() - start})
+        parts = write()
+        seconds = {**self.seconds, "write": time.perf_counter() - start}
+        return replace(self, seconds=seconds, write_seconds=parts)
+
+    def done(self, waited: float, wall: float) -> FrameRecord:
+        """The record of a frame whose files are all there, drawing having waited for them."""
+        return replace(self, seconds={**self.seconds, "wait": waited}, wall_seconds=wall)
 
     def as_json(self) -> dict[str, Any]:
         """The record as `report.json` holds it."""
         entry = asdict(self)
-        seconds, warnings = entry.pop("seconds"), entry.pop("warnings")
+        warnings = entry.pop("warnings")
+        times = {name: entry.pop(name) for name in ("wall_seconds", "seconds", "write_seconds")}
         shares = {"settled_share": self.settled_share, "replication": self.replication}
-        return entry | shares | {"seconds": dict(seconds), "warnings": list(warnings)}
+        return entry | shares | times | {"warnings": list(warnings)}
 
 
 def write_report(path: Path, job_sha: str, version: str, records: Iterable[FrameRecord]) -> None:
@@ -131,9 +152,11 @@ def summary(records: Sequence[FrameRecord]) -> list[tuple[str, str]]:
     if not records:
         return [("frames", "0")]
     lines = [("frames", _frames_text(records))]
-    total = sum(_stage_seconds(records).values())
+    total = sum(record.total_seconds for record in records)
     lines.append(("time", f"{total:.2f} s, {total / len(records):.2f} s a frame"))
-    lines += [(f"  {stage}", f"{seconds:.2f} s") for stage, seconds in _stage_seconds(records).items()]
+    words = {"write": " meanwhile", "wait": " for what is written"}
+    for stage, seconds in _summed(record.seconds for record in records).items():
+        lines.append((f"  {stage}", f"{seconds:.2f} s{words.get(stage, '')}"))
     lines.append(("triangles", _range_text([record.triangles for record in records], "{:,}")))
     lines.append(
         ("settled in pass 1", _range_text([100 * record.settled_share for record in records], "{:.1f} %"))
@@ -172,12 +195,41 @@ def _frames_text(records: Sequence[FrameRecord]) -> str:
     return f"{len(numbers)} ({min(numbers)} to {max(numbers)})" if len(numbers) > 1 else f"1 ({numbers[0]})"
 
 
-def _stage_seconds(records: Sequence[FrameRecord]) -> dict[str, float]:
+def _summed(times: Iterable[Mapping[str, float]]) -> dict[str, float]:
+    """Seconds by stage, of all frames together, in the order the stages come."""
     total: dict[str, float] = {}
-    for record in records:
-        for stage, seconds in record.seconds.items():
-            total[stage] = total.get(stage, 0.0) + seconds
+    for seconds in times:
+        for stage, each in seconds.items():
+            total[stage] = total.get(stage, 0.0) + each
     return total
+
+
+PROFILE_COLUMNS = ("stage", "seconds", "share", "a frame")
+
+
+def profile_rows(records: Sequence[FrameRecord]) -> list[tuple[str, ...]]:
+    """Where the time of a run went, in `PROFILE_COLUMNS`.
+
+    First the stages that follow one another and add up to the run; then the writer, who works while
+    the next frame is drawn; then what its threads did, in seconds of all of them.
+    """
+    stages = _summed(record.seconds for record in records)
+    wall = sum(record.total_seconds for record in records)
+    writing = stages.pop("write", 0.0)
+    parts = _summed(record.write_seconds for record in records)
+    stages["other"] = max(wall - sum(stages.values()), 0.0)
+    rows = [(name, seconds, wall) for name, seconds in stages.items()]
+    rows += [("run", wall, wall), ("write, meanwhile", writing, wall)]
+    rows += [(f"  {name}", seconds, sum(parts.values())) for name, seconds in parts.items()]
+    return [
+        (
+            name,
+            f"{seconds:.3f}",
+            f"{100 * seconds / whole if whole else 0:.1f} %",
+            f"{seconds / len(records):.4f}",
+        )
+        for name, seconds, whole in rows
+    ]
 
 
 def _range_text(values: Sequence[float], form: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -184,3 +185,27 @@ def test_bytes_do_not_depend_on_the_library_s_threads(tmp_path: Path, compressio
         written.append((tmp_path / "a.exr").read_bytes())
     use_threads(1)
     assert written[0] == written[1]
+
+
+# --- where the time goes ---
+
+
+def test_a_profile_is_printed_and_reported(tiny: Path) -> None:
+    out = tiny.parent / "a"
+    result = CliRunner().invoke(
+        main, ["render", str(tiny), "-f", "1-3", "-j", "1", "-o", str(out), "--profile"]
+    )
+    assert result.exit_code == 0, result.output
+    table = [line.split("  ")[0] for line in result.output.split("stage", 1)[1].splitlines()]
+    assert table[1:3] == ["load", "bin"]
+    assert {"wait", "other", "run", "write, meanwhile"} <= set(table)
+    frames = json.loads((out / "report.json").read_text())["frames"]
+    assert ["load" in frame["seconds"] for frame in frames] == [True, False, False]
+    assert all({"cut", "compress and store"} == frame["write_seconds"].keys() for frame in frames)
+    for frame in frames:
+        drawing = sum(
+            time for stage, time in frame["seconds"].items() if stage not in ("write", "wait", "load")
+        )
+        assert drawing > 0
+    wall = sum(frame["wall_seconds"] for frame in frames)
+    assert f"time                    {wall:.2f} s" in result.output

@@ -8,7 +8,14 @@ import pytest
 
 from quiltcli.errors import OutputError
 from quiltcli.progress import frame_line, progress
-from quiltcli.report import FrameRecord, summary, summary_table, summary_warnings, write_report
+from quiltcli.report import (
+    FrameRecord,
+    profile_rows,
+    summary,
+    summary_table,
+    summary_warnings,
+    write_report,
+)
 
 SHA = "ab" * 32
 
@@ -54,7 +61,9 @@ def test_a_report_says_what_made_it_and_how(tmp_path):
                 "fill": 0.75,
                 "settled_share": 0.8,
                 "replication": 1.1,
+                "wall_seconds": 0.0,
                 "seconds": {"bin": 0.5, "raster": 4.0},
+                "write_seconds": {},
                 "warnings": ["nothing is visible"],
             }
         ],
@@ -135,6 +144,51 @@ def test_shares_of_an_empty_scene():
     empty = record(1, triangles=0, reaching=0, pairs=0, settled=0)
     assert empty.settled_share == 1.0
     assert empty.replication == 0.0
+
+
+# --- time ---
+
+
+def written(frame, **changes):
+    """A frame whose writing took 3 s beside the drawing of the next, for one of which this had to wait."""
+    seconds = {"bin": 0.5, "raster": 1.5, "write": 3.0, "wait": 1.0}
+    return record(frame, seconds=seconds, wall_seconds=3.25, write_seconds={"cut": 1, "store": 3}, **changes)
+
+
+def test_a_frame_takes_the_time_on_the_wall_not_that_of_its_stages():
+    assert written(1).total_seconds == 3.25
+    assert summary([written(1), written(2)])[1] == ("time", "6.50 s, 3.25 s a frame")
+    assert frame_line(written(1)).startswith("3.25 s, ")
+
+
+def test_the_summary_says_what_is_done_meanwhile():
+    lines = dict(summary([written(1)]))
+    assert (lines["  write"], lines["  wait"]) == ("3.00 s meanwhile", "1.00 s for what is written")
+
+
+def test_a_profile_adds_up_to_the_run():
+    first = written(1).after("load", 2.0)
+    first = dataclasses.replace(first, wall_seconds=5.25)
+    assert profile_rows([first, written(2)]) == [
+        ("load", "2.000", "23.5 %", "1.0000"),
+        ("bin", "1.000", "11.8 %", "0.5000"),
+        ("raster", "3.000", "35.3 %", "1.5000"),
+        ("wait", "2.000", "23.5 %", "1.0000"),
+        ("other", "0.500", "5.9 %", "0.2500"),
+        ("run", "8.500", "100.0 %", "4.2500"),
+        ("write, meanwhile", "6.000", "70.6 %", "3.0000"),
+        ("  cut", "2.000", "25.0 %", "1.0000"),
+        ("  store", "6.000", "75.0 %", "3.0000"),
+    ]
+
+
+def test_a_frame_is_written_and_done():
+    plain = record(1)
+    assert plain.after("load", 0.0) is plain
+    done = plain.written(lambda: {"cut": 0.25}).done(waited=0.5, wall=2.0)
+    assert list(done.seconds) == ["bin", "raster", "write", "wait"]
+    assert (done.seconds["wait"], done.wall_seconds, done.write_seconds) == (0.5, 2.0, {"cut": 0.25})
+    assert plain.seconds == {"bin": 0.5, "raster": 2.0}
 
 
 # --- the summary ---

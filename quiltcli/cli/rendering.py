@@ -23,6 +23,7 @@ from quiltcli.cli.printing import print_aligned
 @click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Hand the frames to a dask scheduler.")
 @click.option("--dry-run", is_flag=True, help="Find every problem, write nothing.")
+@click.option("--profile", is_flag=True, help="Say where the time went, by stage.")
 @click.option(
     "--set", "sets", metavar="KEY=VALUE", multiple=True, help="Set a value of the job, by dotted path."
 )
@@ -36,6 +37,7 @@ def render(
     threads: int | None,
     scheduler: str | None,
     dry_run: bool,
+    profile: bool,
     sets: tuple[str, ...],
 ) -> None:
     """Render the frames of JOB: quilts, facet images, report."""
@@ -45,10 +47,12 @@ def render(
     if resume and overwrite:
         raise click.UsageError("--resume keeps finished frames and --overwrite replaces them: give one")
     options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run)
-    _render(load_job(job, sets), options, scheduler)
+    records = _render(load_job(job, sets), options, scheduler)
+    if profile and records:
+        _print_profile(records)
 
 
-def _render(job: Any, options: Any, scheduler: str | None) -> None:
+def _render(job: Any, options: Any, scheduler: str | None) -> Any:
     """Render here or on a farm, with progress on stderr and the summary on stdout."""
     from quiltcli.farm import render_on
     from quiltcli.interrupt import Stopped
@@ -75,6 +79,15 @@ def _render(job: Any, options: Any, scheduler: str | None) -> None:
         click.echo(f"written to {options.folder or job.output.directory}")
     else:
         click.echo("every frame is complete already")
+    return records
+
+
+def _print_profile(records: Any) -> None:
+    """Where the time of the run went."""
+    from quiltcli.report import PROFILE_COLUMNS, profile_rows
+
+    click.echo()
+    print_aligned(PROFILE_COLUMNS, profile_rows(records))
 
 
 def _print_summary(records: Any) -> None:
