@@ -34,11 +34,18 @@ from quiltcli.viewer import Viewer
 
 _ROOM = 64  # pairs a triangle there is room for; memory that is not touched costs nothing
 _LEAST_ROOM = 1 << 26
+_MANY_PIXELS = 1 << 20
+_MANY_TRIANGLES = 50_000
 
 
 def can_fork() -> bool:
     """Whether this system has processes that share their parent's memory."""
     return sys.platform.startswith("linux") and "fork" in multiprocessing.get_all_start_methods()
+
+
+def worth_forking(stage: Stage) -> bool:
+    """Whether a frame is likely to take longer than processes take to start and end."""
+    return stage.owners.size >= _MANY_PIXELS or len(stage.scene.triangles) >= _MANY_TRIANGLES
 
 
 def shared_array(length: int, dtype: Any) -> NDArray[Any]:

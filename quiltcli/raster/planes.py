@@ -135,6 +135,8 @@ def edge_planes(homogeneous: FloatArray) -> tuple[FloatArray, FloatArray, FloatA
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = normal / determinant
     inverse[:, determinant == 0] = 0
+    # Depth is measured at the place itself; only what covers it is decided on the shifted lattice.
+    inverse[2] -= LATTICE[0] * inverse[0] + LATTICE[1] * inverse[1]
     _snap_inverse(inverse)
     return edge, inverse, determinant
 
