@@ -67,8 +67,11 @@ format: env ## bring the code's layout in order
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-bench: env ## render the demo's first frames and show the seconds of each stage
-	$(PY) -m quiltcli render scenes/demo.yaml --frames 1-3 --output out/bench --overwrite
+bench: env ## measure against Embree, OpenGL and the disk: 8 minutes (BENCH=--quick: one)
+	$(PY) -m tests.benchmarks $(BENCH)
+
+bench-docs: env ## the same, and put the tables and pictures into docs/performance.md
+	$(PY) -m tests.benchmarks --docs $(BENCH)
 
 packing-table: env ## pack every display by every method and write the tables of docs/packing.md
 	$(PY) -m tests.benchmarks.packing --write docs/packing.md

@@ -1,0 +1,165 @@
+"""The duels: a frame of ours against Embree's rays, OpenGL's draws and the writing of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+
+from quiltcli import raster
+from quiltcli.draw import Buffers, Stage, draw_frame, new_buffers
+from quiltcli.exr import write_exr
+from quiltcli.pool import Pool, can_fork, shared_buffers
+from quiltcli.raster import Frame, rasterize
+from quiltcli.unmap import page_of
+from quiltcli.viewer import Viewer
+from tests.benchmarks import meshes, opengl
+from tests.benchmarks.embree import caster
+from tests.benchmarks.meshes import Mesh
+from tests.benchmarks.race import Contestants, race
+from tests.benchmarks.stages import (
+    Place,
+    Work,
+    ball,
+    binned,
+    cube,
+    culled,
+    pixel_rays,
+    stage_for,
+    viewer_of,
+    with_mesh,
+)
+from tests.benchmarks.watching import replaced
+
+QUILT = (8192, 8192)
+WHOLE_MESH = 2
+"""Level of detail at which the whole mesh is drawn once a facet: the full one would take a quarter minute."""
+
+SCENES: Mapping[str, Callable[[], Mesh]] = {
+    "dragon": lambda: meshes.detailed(3),
+    "room": meshes.room,
+    "mixed": meshes.mixed,
+    "spheres": meshes.spheres,
+}
+DISPLAYS: Mapping[str, Callable[[], Place]] = {"cube": cube, "ball": lambda: ball(3)}
+NAMES = ("dragon/ball", "dragon/cube", "room/cube", "room/ball", "mixed/cube", "mixed/ball", "spheres/cube")
+QUICK = ("dragon/ball", "room/cube")
+
+
+@lru_cache(maxsize=2)
+def _empty_stage(display: str) -> tuple[Place, Stage]:
+    place = DISPLAYS[display]()
+    return place, stage_for(place, meshes.room(1), QUILT)
+
+
+def duel(name: str, rounds: int, scratch: Path, *, quick: bool = False) -> dict[str, Any]:
+    """Measure one configuration, `scene/display`."""
+    scene, display = name.split("/")
+    place, stage = _empty_stage(display)
+    stage = with_mesh(stage, place, SCENES[scene]())
+    viewer = viewer_of(place)
+    kinds = {"culled": culled(stage), "two-sided": stage}
+    counts = {}
+    with ExitStack() as ends:
+        contestants: dict[str, Callable[[], object]] = {}
+        for kind, made in kinds.items():
+            work = binned(made, viewer)
+            buffers = (shared_buffers if can_fork() else new_buffers)(made)
+            counts[kind] = _counts(made, viewer, work, buffers)
+            contestants |= _ours(kind, made, viewer, work, buffers, ends)
+        rays = list(pixel_rays(stage, work.frame))
+        counts["lit pixels"] = sum(map(len, rays))
+        contestants["embree"] = caster(work.frame.sight, rays)
+        if not opengl.renderer().startswith("-"):
+            contestants |= _opengl(kinds, viewer, ends)
+        times = race(contestants, rounds)
+        times |= race(_writes(stage, buffers, scratch), 1 if quick else rounds, once=0.5, warm=False)
+    if name == "dragon/ball" and not quick and "opengl two-sided draw" in times:
+        times |= _whole_mesh(place, stage)
+    return {"counts": counts, "times": times}
+
+
+def _counts(stage: Stage, viewer: Viewer, work: Work, buffers: Buffers) -> dict[str, int]:
+    record = draw_frame(stage, viewer, buffers)
+    return {
+        "triangles": record.triangles,
+        "pairs": record.pairs,
+        "block pairs": int(work.frame.pairs.triangle.size),
+        "visible pixels": record.visible_pixels,
+    }
+
+
+def _ours(
+    kind: str, stage: Stage, viewer: Viewer, work: Work, buffers: Buffers, ends: ExitStack
+) -> Contestants:
+    """Our own ways: binning, depth keys, hits and whole frames."""
+    dirty = np.ones(stage.facets.count, dtype=np.bool_)
+    frame = partial(draw_frame, stage, viewer, buffers, dirty=dirty)
+    contestants: dict[str, Callable[[], object]] = {
+        f"{kind} bin": lambda: binned(stage, viewer),
+        f"{kind} keys": lambda: depth_keys(work),
+        f"{kind} hits": lambda: all_hits(work),
+        f"{kind} frame 1": partial(frame, 1),
+    }
+    if can_fork():
+        pool = ends.enter_context(Pool(stage, [buffers], 2))
+        contestants[f"{kind} frame 2"] = partial(frame, run=pool.draw)
+    return contestants
+
+
+def depth_keys(work: Work) -> None:
+    """Visibility alone: rasterize every batch up to its depth keys, and read nothing from them."""
+    with replaced(raster, "read_canvas", lambda *_: iter(())):
+        all_hits(work)
+
+
+def all_hits(work: Work) -> int:
+    """Rasterize every batch; the number of pixels that see the scene."""
+    return sum(hits.pixel.size for batch in work.batches for hits in rasterize(work.frame, batch))
+
+
+def _opengl(kinds: Mapping[str, Stage], viewer: Viewer, ends: ExitStack) -> Contestants:
+    contestants: dict[str, Callable[[], object]] = {}
+    for kind, stage in kinds.items():
+        quilt = ends.enter_context(opengl.Quilt(stage, _frame(stage, viewer), culling=kind == "culled"))
+        contestants[f"opengl {kind} draw"] = partial(quilt.draw, "ggx")
+        if kind == "two-sided":
+            contestants["opengl lambert draw"] = partial(quilt.draw, "lambert")
+            contestants["opengl read"] = quilt.read
+    return contestants
+
+
+def _frame(stage: Stage, viewer: Viewer) -> Frame:
+    return binned(stage, viewer).frame
+
+
+def _writes(stage: Stage, buffers: Buffers, scratch: Path) -> Contestants:
+    """Write the quilt that was drawn, with two of the library's threads."""
+    OpenEXR.set_global_thread_count(2)
+    pixels = {name: page_of(flat, stage.layout, 0) for name, flat in buffers.items()}
+    return {
+        f"write {kind}": partial(write_exr, scratch / f"quilt_{kind}.exr", pixels, {}, kind)
+        for kind in ("zip", "zstd")
+    }
+
+
+def _whole_mesh(place: Place, stage: Stage) -> dict[str, dict[str, list[float]]]:
+    """The usual way, every triangle to every facet, against ours with the same mesh; one round."""
+    stage, viewer = with_mesh(stage, place, meshes.detailed(WHOLE_MESH)), viewer_of(place)
+    buffers = (shared_buffers if can_fork() else new_buffers)(stage)
+    dirty = np.ones(stage.facets.count, dtype=np.bool_)
+    with ExitStack() as ends:
+        pool = ends.enter_context(Pool(stage, [buffers], 2)) if can_fork() else None
+        quilt = ends.enter_context(opengl.Quilt(stage, _frame(stage, viewer), culling=False))
+        run = pool.draw if pool else None
+        draw_frame(stage, viewer, buffers, dirty=dirty, run=run)
+        contestants: Contestants = {
+            "smaller mesh frame 2": lambda: draw_frame(stage, viewer, buffers, dirty=dirty, run=run),
+            "smaller mesh opengl whole": lambda: quilt.draw("ggx", whole_mesh=True),
+        }
+        return race(contestants, 3, once=1.0, warm=False)

@@ -1,0 +1,86 @@
+"""What the program is held to, as ratios of things timed in one run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tests.benchmarks.race import ratio
+
+KINDS = ("culled", "two-sided")
+_EMBREE = "/ Embree, 1 thread"
+_MIDDLE = ("mixed", "spheres")  # scenes with many triangles of 10 to 60 pixels
+
+
+@dataclass(frozen=True)
+class Target:
+    """A bound, what was found, and the configuration that is farthest from it."""
+
+    what: str
+    where: str
+    value: float
+    limit: float
+    unit: str = ""
+
+    @property
+    def met(self) -> bool:
+        """Whether the bound is kept."""
+        return self.value <= self.limit
+
+
+def targets(results: Mapping[str, Any]) -> list[Target]:
+    """All targets the results say something about."""
+    duels = {name: found["times"] for name, found in results.get("duels", {}).items()}
+    found = [*_visibility(duels), *_frames(duels), *_sequences(results.get("sequences", []))]
+    return [target for target in found if not math.isnan(target.value)]
+
+
+def _worst(what: str, values: Mapping[str, float], limit: float) -> Iterator[Target]:
+    known = {name: value for name, value in values.items() if not math.isnan(value)}
+    if known:
+        name = max(known, key=known.__getitem__)
+        yield Target(what, name, known[name], limit)
+
+
+def _visibility(duels: Mapping[str, Any]) -> Iterator[Target]:
+    """One thread each, so in processor time: other work on the machine does not count."""
+    for kind, limit in (("culled", 0.6), ("two-sided", 0.9)):
+        values = {name: ratio(times, f"{kind} keys", "embree", "cpu") for name, times in duels.items()}
+        what = f"visibility, {kind}, 1 process {_EMBREE}"
+        if kind == "culled":
+            for name, bound in (("dragon/ball", 0.45), ("room/cube", 0.12)):
+                if name in values:
+                    yield Target(what, name, values[name], bound)
+        yield from _worst(f"{what}, everywhere", values, limit)
+
+
+def _frames(duels: Mapping[str, Any]) -> Iterator[Target]:
+    draws, read = {}, {}
+    for name, times in duels.items():
+        for kind in KINDS:
+            key = f"{name} {kind}"
+            draws[key] = ratio(times, f"{kind} frame 2", f"opengl {kind} draw")
+            read[key] = ratio(times, f"{kind} frame 2", (f"opengl {kind} draw", "opengl read"))
+    middle = {name: value for name, value in draws.items() if name.startswith(_MIDDLE)}
+    plain = {name: value for name, value in draws.items() if name not in middle}
+    yield from _worst("frame, 2 workers / llvmpipe's draws and readback, everywhere", read, 0.7)
+    yield from _worst("frame, 2 workers / llvmpipe's draws, dragon and room", plain, 1.2)
+    yield from _worst("frame, 2 workers / llvmpipe's draws, mixed and spheres", middle, 2.0)
+    ball = duels.get("dragon/ball", {})
+    whole = ratio(ball, "smaller mesh frame 2", "smaller mesh opengl whole")
+    yield Target("frame, 2 workers / llvmpipe, whole mesh once a facet", "202K/ball two-sided", whole, 0.05)
+    for kind, limit in (("culled", 0.6), ("two-sided", 0.9)):
+        value = ratio(ball, f"{kind} frame 2", "embree")
+        yield Target(f"frame, 2 workers {_EMBREE}", f"dragon/ball {kind}", value, limit)
+
+
+def _sequences(sequences: list[Mapping[str, Any]]) -> Iterator[Target]:
+    for one in sequences:
+        limit = {"zip": 1.25, "zstd": 1.5}.get(one["compression"], math.inf)
+        what = f"{one['frames']} frames / writing them alone"
+        yield Target(what, one["compression"], one["sequence"] / one["writing alone"], limit)
+    if sequences:
+        memory = max(one["memory"] for one in sequences) / 1e9
+        yield Target("memory of all processes", "dragon/ball", memory, 3.0, " GB")

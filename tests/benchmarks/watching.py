@@ -1,0 +1,116 @@
+"""Looking into a frame from outside: the time of its stages, and how often things are done.
+
+Functions of the program are wrapped for a while. Which, is one table: whoever moves one of them moves
+its row.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from types import GeneratorType
+from typing import Any
+
+from quiltcli import binning, channels, draw, raster
+
+STAGES: tuple[tuple[object, str, str], ...] = (
+    (draw, "bin_triangles", "bin"),
+    (binning, "core_of_vertices", "bin: first pass"),
+    (binning, "_second_pass", "bin: second pass"),
+    (draw, "split_pairs", "prewarp"),
+    (raster, "make_planes", "prewarp"),
+    (raster, "draw_small", "small triangles"),
+    (raster, "draw_large", "large triangles"),
+    (raster, "read_canvas", "visibility"),
+    (channels, "shade", "shade"),
+    (draw, "fill", "store"),
+    (draw, "clear", "clear"),
+)
+"""Module, function, and the stage whose time it is."""
+
+
+@contextmanager
+def replaced(module: object, name: str, value: object) -> Iterator[None]:
+    """A name of a module bound to something else for a while."""
+    old = getattr(module, name)
+    setattr(module, name, value)
+    try:
+        yield
+    finally:
+        setattr(module, name, old)
+
+
+class Stopwatch:
+    """Seconds by stage; a stage's time does not include the stages it calls."""
+
+    def __init__(self) -> None:
+        self.seconds: Counter[str] = Counter()
+        self._running = ["rest"]
+        self._since = time.perf_counter()
+
+    def _turn(self) -> None:
+        """Give the time since the last turn to the innermost stage."""
+        now = time.perf_counter()
+        self.seconds[self._running[-1]] += now - self._since
+        self._since = now
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time of the block belongs to this stage."""
+        self._turn()
+        self._running.append(name)
+        try:
+            yield
+        finally:
+            self._turn()
+            self._running.pop()
+
+    def timed(self, function: Callable[..., Any], name: str) -> Callable[..., Any]:
+        """The function with its time given to a stage, a generator's with all its steps."""
+
+        def steps(values: Iterator[Any]) -> Iterator[Any]:
+            while True:
+                with self.stage(name):
+                    value = next(values, values)
+                if value is values:
+                    return
+                yield value
+
+        def call(*given: Any, **named: Any) -> Any:
+            with self.stage(name):
+                result = function(*given, **named)
+            return steps(result) if isinstance(result, GeneratorType) else result
+
+        return call
+
+
+def stage_seconds(work: Callable[[], object]) -> dict[str, float]:
+    """Seconds by stage of `work`, done in this process and this thread's time."""
+    watch = Stopwatch()
+    with ExitStack() as ends:
+        for module, name, stage in STAGES:
+            ends.enter_context(replaced(module, name, watch.timed(getattr(module, name), stage)))
+        with watch.stage("rest"):
+            work()
+    return dict(watch.seconds)
+
+
+@contextmanager
+def counted(probes: Mapping[tuple[object, str], Callable[..., Mapping[str, int]]]) -> Iterator[Counter[str]]:
+    """Sums of what probes say of every call: each is given the result and the arguments of its function."""
+    sums: Counter[str] = Counter()
+
+    def watched(function: Callable[..., Any], probe: Callable[..., Mapping[str, int]]) -> Callable[..., Any]:
+        def call(*given: Any, **named: Any) -> Any:
+            result = function(*given, **named)
+            sums.update(probe(result, *given))
+            return result
+
+        return call
+
+    with ExitStack() as ends:
+        for (module, name), probe in probes.items():
+            ends.enter_context(replaced(module, name, watched(getattr(module, name), probe)))
+        yield sums

@@ -1,0 +1,208 @@
+"""What a frame costs, in things done instead of seconds: how it grows with facets, triangles and pixels."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from benchmarks.watching import STAGES, counted, stage_seconds
+from rig import display, icosphere, viewer
+from wallscene import lights, wall
+
+from quiltcli import binning, draw, raster
+from quiltcli.display import Facets
+from quiltcli.draw import Stage, draw_frame, new_buffers, stage_of
+from quiltcli.job import JobFile
+from quiltcli.layout import align
+from quiltcli.packing import pack
+from quiltcli.scene import Scene
+
+EYE = viewer((2.2, 1.8, 3.2))
+PIXELS = 400_000  # of all facets together, lit or not
+
+PROBES = {
+    (binning, "candidate_pairs"): lambda found, *_: {"proposed": found[0].size},
+    (draw, "bin_triangles"): lambda pairs, *_: {"pairs": pairs.facet.size},
+    (draw, "split_pairs"): lambda pairs, *_: {"block pairs": pairs.triangle.size},
+    (raster, "draw_small"): lambda candidates, *_: {"small": candidates},
+    (raster, "draw_large"): lambda evaluated, *_: {"large": evaluated},
+    (draw, "block_window"): lambda pixels, buffer, *_: {"bytes": pixels.size * buffer.itemsize},
+    (draw, "fill"): lambda _, buffers, channels, scene, eye, hits: {
+        "hits": hits.pixel.size,
+        "bytes": hits.pixel.size * sum(buffer.itemsize for buffer in buffers.values()),
+    },
+}
+
+
+def done(stage: Stage) -> Counter[str]:
+    """Counts of one frame into empty buffers."""
+    buffers = new_buffers(stage)
+    clean = np.zeros(stage.facets.count, bool)
+    with counted(PROBES) as counts:
+        draw_frame(stage, EYE, buffers, dirty=clean)
+    counts["evaluated"] = counts["small"] + counts["large"]
+    return counts
+
+
+def ball_scene(splits: int, radius: float = 0.8) -> Scene:
+    vertices, triangles = icosphere(splits)
+    plain = wall(lights(ambient=(1, 1, 1)))
+    count = len(triangles)
+    return Scene(
+        vertices=vertices * radius,
+        triangles=triangles,
+        normals=vertices.astype(np.float32),
+        colors=np.ones(vertices.shape, np.float32),
+        flat=np.zeros(count, bool),
+        object=np.zeros(count, np.int32),
+        material=np.zeros(count, np.int32),
+        objects=("ball",),
+        materials=plain.materials,
+        lights=plain.lights,
+        background=np.zeros(3, np.float32),
+        notices=(),
+    )
+
+
+def stage_of_facets(facets: Facets, scene: Scene) -> Stage:
+    path = {"keyframes": [{"frame": 1, "position": [0, 0, 2], "look_at": [0, 0, 0]}]}
+    spec = {
+        "display": "d.yaml",
+        "scene": "s.obj",
+        "frames": "1",
+        "viewer": {"near": 0.1, "far": 9, "path": path},
+    }
+    facets, layout = align(pack(facets, "rows"), facets)
+    return stage_of(JobFile.model_validate(spec), facets, layout, scene, bleed=0)
+
+
+def ball_display(splits: int, pixels: float = PIXELS) -> Facets:
+    """An icosphere of 20·4ˢ facets that together have so many pixels."""
+    vertices, triangles = icosphere(splits)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    return display(vertices, triangles.tolist(), (pixels / area) ** 0.5)
+
+
+@lru_cache
+def by_facets() -> list[Counter[str]]:
+    scene = ball_scene(4)
+    return [done(stage_of_facets(ball_display(splits), scene)) for splits in range(4)]
+
+
+@lru_cache
+def by_triangles() -> list[Counter[str]]:
+    facets = ball_display(2)
+    return [done(stage_of_facets(facets, ball_scene(splits))) for splits in (3, 4, 5, 6)]
+
+
+@lru_cache
+def by_pixels() -> list[Counter[str]]:
+    scene = ball_scene(2)
+    return [done(stage_of_facets(ball_display(2, PIXELS * 4**k), scene)) for k in range(3)]
+
+
+def growth(counts: list[Counter[str]], what: str) -> list[float]:
+    """Each count over the one before it."""
+    assert all(c[what] > 0 for c in counts), what
+    return [b[what] / a[what] for a, b in pairwise(counts)]
+
+
+# Facets: 20, 80, 320, 1280 that together have the same pixels; the scene has 5120 triangles.
+
+
+def test_pairs_grow_with_the_edges_between_facets_not_with_facets():
+    # Four times the facets have edges twice as long together, and only triangles on an edge count twice.
+    for what in ("pairs", "block pairs"):
+        assert max(growth(by_facets(), what)) < 2
+    assert by_facets()[-1]["pairs"] < 3 * 5120
+
+
+def test_the_broad_phase_proposes_what_lies_on_edges_not_triangles_times_facets():
+    assert max(growth(by_facets(), "proposed")) < 2.5
+    assert by_facets()[-1]["proposed"] < 0.01 * 5120 * 1280
+
+
+def test_pixels_that_are_looked_at_do_not_depend_on_the_number_of_facets():
+    for counts in by_facets():
+        assert counts["evaluated"] < 12 * counts["hits"]
+    assert max(growth(by_facets(), "evaluated")) < 1.3
+
+
+# Triangles: 1280, 5120, 20480, 81920 of the same ball on 320 facets.
+
+
+def test_work_is_linear_in_triangles():
+    for what in ("pairs", "block pairs", "proposed"):
+        assert max(growth(by_triangles(), what)) < 4.2
+
+
+def test_smaller_triangles_do_not_waste_pixels():
+    for counts in by_triangles():
+        assert counts["evaluated"] < 15 * counts["hits"]
+
+
+def test_the_picture_is_stored_once_however_many_triangles_it_has():
+    for what in ("hits", "bytes"):
+        assert growth(by_triangles(), what) == pytest.approx([1, 1, 1], abs=0.03)
+
+
+# Pixels: four times as many, twice.
+
+
+def test_pixels_and_bytes_are_linear_in_the_resolution():
+    for what in ("hits", "bytes"):
+        assert growth(by_pixels(), what) == pytest.approx([4, 4], rel=0.02)
+    assert max(growth(by_pixels(), "evaluated")) < 4.2
+
+
+def test_binning_does_not_depend_on_the_resolution():
+    assert growth(by_pixels(), "pairs") == pytest.approx([1, 1], rel=0.05)
+
+
+# What cannot be seen costs nothing.
+
+
+def lit_and_dark(dark: int) -> Facets:
+    """A wall towards the eye, and walls beside it that show their backs."""
+    wall = np.array([(-1.0, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
+    vertices = np.concatenate([wall, *(wall + (0, 0, -0.01 * k) for k in range(1, dark + 1))])
+    polygons = [[0, 1, 2, 3]] + [[4 * k + 3, 4 * k + 2, 4 * k + 1, 4 * k] for k in range(1, dark + 1)]
+    return display(vertices, polygons, 100)
+
+
+def test_unlit_facets_cost_nothing():
+    scene = ball_scene(3)
+    alone, among = (done(stage_of_facets(lit_and_dark(dark), scene)) for dark in (0, 40))
+    assert alone == among
+
+
+def test_only_what_was_drawn_is_cleared():
+    stage = stage_of_facets(lit_and_dark(40), ball_scene(3))
+    buffers = new_buffers(stage)
+    drawn = np.arange(stage.facets.count) == 0
+    with counted(PROBES) as counts:
+        draw_frame(stage, EYE, buffers, dirty=drawn)
+    rectangle = int((stage.blocks.width * stage.blocks.height)[0])
+    assert counts["bytes"] == 12 * (rectangle + counts["hits"])
+
+
+def test_culled_triangles_are_neither_binned_nor_drawn():
+    stage = stage_of_facets(ball_display(2), ball_scene(5))
+    culling = stage.job.render.model_copy(update={"backface_culling": True})
+    both, one = done(stage), done(replace(stage, job=stage.job.model_copy(update={"render": culling})))
+    assert one["hits"] == both["hits"]
+    for what in ("pairs", "evaluated"):
+        assert one[what] < 0.6 * both[what]
+
+
+def test_the_stages_that_benchmarks_time_are_those_of_a_frame():
+    stage = stage_of_facets(ball_display(0), ball_scene(3))
+    buffers = new_buffers(stage)
+    times = stage_seconds(lambda: draw_frame(stage, EYE, buffers))
+    assert set(times) == {name for _, _, name in STAGES} | {"rest"}
+    assert min(times.values()) > 0
