@@ -159,7 +159,8 @@ def owner_of(point, polygons, bleed):
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6), bleed=st.sampled_from([0.0, 0.7, 2.0, 3.3]))
 def test_owners_agree_with_winding_numbers_and_distances(seed, bleed):
-    polygons = [polygon * 0.9713 for polygon in random_polygons(4, 4, 12, seed)]  # no ties
+    # Two factors, so that no slanted edge runs through pixel centres: there the two may differ.
+    polygons = [polygon * (0.9713, 0.9379) for polygon in random_polygons(4, 4, 12, seed)]
     layout = pack(flat_display(polygons), "rows", (26, 26), padding=1, max_pages=1)
     assert brute_force(layout, bleed) == pixel_owners(layout, bleed).tolist()
 
