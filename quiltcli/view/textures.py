@@ -21,6 +21,8 @@ from quiltcli.unmap import page_of
 
 _BLEED = 2.0**-10  # weight of a pixel past a facet's edge: it counts only where no facet's own does
 
+_AROUND = [(y, x) for y in range(3) for x in range(3)]
+
 
 @dataclass(frozen=True)
 class Coding:
@@ -78,7 +80,19 @@ def extents(layout: Layout, side: int) -> NDArray[np.int64]:
 def page_picture(shown: Shown, page: int, coding: Coding, view: str, exposure: float) -> Picture:
     """One page (0-based) of the images a display shows."""
     light = page_light(shown, page, factor(shown.layout.pages[page].tolist(), coding.side))
-    return picture(tone_map(light, view, exposure), coding.quality)
+    return picture(_tone_mapped(light, view, exposure), coding.quality)
+
+
+def _tone_mapped(light: Float32Array, view: str, exposure: float) -> Bytes:
+    """As `preview.tone_map`, which looks at every pixel by itself: here once a run of equal ones.
+
+    Most of a page is the background of the scene, or of no facet.
+    """
+    flat = light.reshape(-1, 3)
+    fresh = np.concatenate(([True], (flat[1:] != flat[:-1]).any(axis=1)))
+    start = np.flatnonzero(fresh)
+    mapped = tone_map(flat[start][None], view, exposure)[0]
+    return np.repeat(mapped, np.diff(start, append=len(flat)), axis=0).reshape(light.shape)
 
 
 def page_light(shown: Shown, page: int, by: int) -> Float32Array:
@@ -99,18 +113,20 @@ def page_light(shown: Shown, page: int, by: int) -> Float32Array:
 
 def _grown(light: Float32Array, known: BoolArray) -> Float32Array:
     """The light with pixels beside known ones filled with their mean."""
+    around = np.pad(known, 1)
     height, width = known.shape
-    some = np.pad(known, 1).astype(np.float32)
-    padded = np.pad(np.where(known[..., None], light, np.float32(0)), ((1, 1), (1, 1), (0, 0)))
-    count = np.zeros((height, width), dtype=np.float32)
-    total = np.zeros_like(light)
-    for y in range(3):
-        for x in range(3):
-            count += some[y : y + height, x : x + width]
-            total += padded[y : y + height, x : x + width]
-    edge = ~known & (count > 0)
-    result = light.copy()
-    result[edge] = total[edge] / count[edge][:, None]
+    near = np.zeros_like(known)
+    for y, x in _AROUND:
+        near |= around[y : y + height, x : x + width]
+    row, column = np.nonzero(near & ~known)
+    count = np.zeros(row.size, dtype=np.float32)
+    total = np.zeros((row.size, 3), dtype=np.float32)
+    for y, x in _AROUND:
+        there = np.flatnonzero(around[row + y, column + x])
+        count[there] += 1
+        total[there] += light[row[there] + y - 1, column[there] + x - 1]
+    result = np.where(known[..., None], light, np.float32(0))
+    result[row, column] = total / count[:, None]
     return result
 
 

@@ -76,7 +76,7 @@ function drawLabels(canvas, display, camera, width, height, ratio) {
     const facing = display.data.mesh.both ? Math.abs(turned) : turned;
     spot.copy(middle).project(camera);
     const room = (size * scale * Math.max(facing, 0)) / camera.position.distanceTo(middle);
-    if (spot.z < -1 || spot.z > 1 || room < 16) return;
+    if (spot.z < -1 || spot.z > 1 || room < 5 + 8 * String(f + 1).length) return;
     const at = [(0.5 + 0.5 * spot.x) * width, (0.5 - 0.5 * spot.y) * height];
     const name = display.data.names[f];
     const words = name && room > 9 * name.length + 30 ? `${f + 1} ${name}` : `${f + 1}`;

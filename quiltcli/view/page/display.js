@@ -34,6 +34,7 @@ uniform sampler2D heat;
 uniform vec2 span;
 uniform float both;
 uniform float hot;
+uniform float backs;
 uniform mat4 heatFrom;
 uniform vec3 edgeOn;
 uniform vec3 faceOn;
@@ -50,6 +51,7 @@ void main() {
   dx *= fits;
   dy *= fits;
   float turned = dot(normalOut, normalize(world - cameraPosition));
+  if (backs < 0.5 && both < 0.5 && turned > 0.0) discard;
   vec3 color = mix(edgeOn, faceOn, abs(turned));
   if (shows > 0.5 && (both > 0.5 || turned < 0.0)) {
     color = 0.25 * (look(place + dx + dy) + look(place + dx - dy) + look(place - dx + dy) + look(place - dx - dy));
@@ -87,7 +89,7 @@ class Display {
     this.shared = this.attributes(unpack(mesh.quilt, Float32Array));
     const [, edgeOn, faceOn] = data.greys.map(linear);
     this.uniforms = {
-      both: { value: mesh.both ? 1 : 0 }, hot: { value: 0 }, heat: { value: null },
+      both: { value: mesh.both ? 1 : 0 }, hot: { value: 0 }, backs: { value: 1 }, heat: { value: null },
       heatFrom: { value: new THREE.Matrix4() }, edgeOn: { value: edgeOn }, faceOn: { value: faceOn },
     };
     this.meshes = this.makeMeshes(unpack(mesh.triangles, Uint32Array), unpack(mesh.facet, Uint32Array));
@@ -176,9 +178,26 @@ class Display {
     this.uniforms.heatFrom.value.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
   }
 
-  /** The same colour on all pages. */
-  setHot(on) {
-    this.uniforms.hot.value = on ? 1 : 0;
+  /** Show errors instead of images; show facets from behind, or look through them. */
+  set(hot, backs) {
+    this.uniforms.hot.value = hot ? 1 : 0;
+    this.uniforms.backs.value = backs ? 1 : 0;
+  }
+
+  /** Whether a facet is drawn as seen from a place. */
+  drawnFrom(f, place) {
+    const { middle, normal } = this.middles[f];
+    return this.uniforms.backs.value > 0 || this.data.mesh.both || place.clone().sub(middle).dot(normal) > 0;
+  }
+
+  /** Whether the display is around an eye, so that a part of it lies behind. */
+  surrounds(frame) {
+    const [eye, look] = [new THREE.Vector3(...frame.eye), new THREE.Vector3(...frame.camera.look)];
+    return this.points().some((corner) => corner.sub(eye).dot(look) <= 0);
+  }
+
+  points() {
+    return Array.from({ length: this.corners }, (_, c) => new THREE.Vector3().fromArray(this.position, 3 * c));
   }
 
   describe(f) {

@@ -15,6 +15,7 @@ const SWITCHES = [
   { name: "edges", key: "w", words: "Facet edges", on: false },
   { name: "ghost", key: "g", words: "Scene as ghost, off the eye", on: true },
   { name: "path", key: "p", words: "Viewer and path, off the eye", on: true },
+  { name: "backs", key: "b", words: "Facets from behind", on: true },
   { name: "nearest", key: "n", words: "Single pixels", on: false },
   { name: "heat", key: "h", words: "Errors as heat map", on: false },
 ];
@@ -39,12 +40,11 @@ class Page {
     const { data, settings } = this;
     const missing = { ghost: !data.ghost, heat: !data.frames.some((frame) => frame.heat) };
     this.switches = SWITCHES.filter(({ name }) => !missing[name]);
-    const on = {};
-    for (const { name, on: usual } of this.switches) {
-      const opens = name === "nearest" ? data.nearest : usual;
-      on[name] = settings.has(name) ? settings.get(name) !== "0" : opens;
-    }
-    return on;
+    // A display around the eye would hide all it shows, and the scene around it the display.
+    const inside = this.display.surrounds(data.frames[0]);
+    const opens = { nearest: data.nearest, backs: !inside, ghost: !inside };
+    const chosen = ({ name, on }) => (settings.has(name) ? settings.get(name) !== "0" : opens[name] ?? on);
+    return Object.fromEntries(this.switches.map((each) => [each.name, chosen(each)]));
   }
 
   makeWorld() {
@@ -75,6 +75,7 @@ class Page {
     at("frames").style.display = this.data.frames.length < 2 ? "none" : "";
     at("slider").max = this.data.frames.length - 1;
     if (this.settings.get("panel") === "0") at("panel").style.display = "none";
+    at("panel").classList.toggle("folded", window.innerWidth < 600);
     for (const { name, key, words } of this.switches) {
       const label = document.createElement("label");
       const box = document.createElement("input");
@@ -238,7 +239,7 @@ class Page {
     this.fromAside = true;
     const { camera, display } = this;
     const eye = new THREE.Vector3(...this.frame.eye);
-    const points = [eye, ...display.middles.map(({ middle }) => middle)];
+    const points = [eye, ...display.points()];
     const middle = eye.clone().multiplyScalar(0.4);
     const back = new THREE.Vector3(eye.x, 0, eye.z);
     if (back.length() < 0.05 * this.data.radius) back.set(0, 0, 1);
@@ -294,10 +295,12 @@ class Page {
     const where = new THREE.Vector2((2 * event.clientX) / this.width - 1, 1 - (2 * event.clientY) / this.height);
     const ray = new THREE.Raycaster();
     ray.setFromCamera(where, this.camera);
-    const [hit] = event.buttons ? [] : ray.intersectObjects(this.display.meshes, false);
+    const facet = (hit) => this.display.cornerFacet[hit.face.a];
+    const hits = event.buttons ? [] : ray.intersectObjects(this.display.meshes, false);
+    const hit = hits.find((each) => this.display.drawnFrom(facet(each), this.camera.position));
     tip.style.display = hit ? "block" : "none";
     if (!hit) return;
-    tip.textContent = this.display.describe(this.display.cornerFacet[hit.face.a]);
+    tip.textContent = this.display.describe(facet(hit));
     tip.style.left = `${Math.min(event.clientX + 14, window.innerWidth - tip.offsetWidth - 8)}px`;
     tip.style.top = `${Math.min(event.clientY + 14, window.innerHeight - tip.offsetHeight - 8)}px`;
   }
@@ -313,7 +316,7 @@ class Page {
     const off = !this.atEye;
     for (const thing of this.around) thing.visible = off && this.on.path;
     this.display.edges.visible = this.on.edges;
-    this.display.setHot(this.on.heat && this.frame.heat);
+    this.display.set(this.on.heat && this.frame.heat, this.on.backs);
     this.renderer.clear();
     this.renderer.render(this.scene, this.camera);
     if (this.ghost && off && this.on.ghost) {
