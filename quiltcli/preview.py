@@ -1,30 +1,37 @@
-"""Pictures to look at: linear light through a display's view into an 8-bit PNG.
+"""Pictures to look at and to hand on: linear light through a display's view, in 8 or 16 bits.
 
 The view is the SDR view of ACES 1.0 from an OpenColorIO configuration that is built into the library
-and pinned by name, so a picture does not change with the machine's settings; the plain curve of
-sRGB, which cuts what is brighter than white, is the alternative.
+and pinned by name, so a picture does not change with the machine's settings. The alternatives cut what
+is brighter than white: the plain curve of sRGB, and the light itself, raw.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.errors import OutputError, Problem
+from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.exr import read_exr
 from quiltcli.exrwindow import whole_frame
 from quiltcli.geometry import Float32Array
 from quiltcli.wholefile import make_folder, whole_file
 
 Bytes: TypeAlias = NDArray[np.uint8]
+Values: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]
 
 CONFIG = "ocio://cg-config-v2.2.0_aces-v1.3_ocio-v2.4"
 LARGEST = 2048
-"""Pixels a preview has at most in width and height."""
+"""Pixels a preview has at most in width and height; a picture of 16 bits, made to be shown, has them all."""
+DEPTHS = (8, 16)
+FORMATS = {".png": "png", ".tif": "tiff", ".tiff": "tiff"}
+_FIELD = re.compile("#+")
+_STRIP = 1 << 21  # pixels that go through a view together
 
 
 def aces(rgb: Float32Array) -> Float32Array:
@@ -53,7 +60,12 @@ def srgb(rgb: Float32Array) -> Float32Array:
     return result
 
 
-VIEWS: dict[str, Callable[[Float32Array], Float32Array]] = {"aces": aces, "srgb": srgb}
+def raw(rgb: Float32Array) -> Float32Array:
+    """The linear light itself."""
+    return rgb
+
+
+VIEWS: dict[str, Callable[[Float32Array], Float32Array]] = {"aces": aces, "srgb": srgb, "raw": raw}
 
 
 def tone_map(rgb: NDArray[Any], view: str = "aces", exposure: float = 0.0) -> Bytes:
@@ -67,9 +79,37 @@ def tone_map(rgb: NDArray[Any], view: str = "aces", exposure: float = 0.0) -> By
     Returns:
         (H, W, 3) uint8.
     """
-    light = np.nan_to_num(np.asarray(rgb, dtype=np.float32), nan=0.0, posinf=65504.0, neginf=0.0)
-    shown = VIEWS[view](light * np.float32(2.0**exposure))
-    result: Bytes = np.rint(np.clip(shown, 0, 1) * 255).astype(np.uint8)
+    return display_values(rgb, Look(view, exposure)).astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How light becomes a picture.
+
+    Attributes:
+        view: a name of `VIEWS`.
+        exposure: stops the picture is made brighter by.
+        depth: bits a channel, 8 or 16.
+        largest: most pixels in width and height; 0 for all there are.
+    """
+
+    view: str = "aces"
+    exposure: float = 0.0
+    depth: int = 8
+    largest: int = LARGEST
+
+
+def display_values(rgb: NDArray[Any], look: Look) -> Values:
+    """Linear light (H, W, 3) as what a screen is sent (H, W, 3), uint8 or uint16; see `tone_map`."""
+    top = 2**look.depth - 1
+    result = np.empty(rgb.shape, dtype=np.uint8 if look.depth == 8 else np.uint16)
+    rows = max(_STRIP // max(rgb.shape[1], 1), 1)
+    for start in range(0, len(rgb), rows):
+        light = np.asarray(rgb[start : start + rows], dtype=np.float32)
+        light = np.nan_to_num(light, nan=0.0, posinf=65504.0, neginf=0.0) * np.float32(2.0**look.exposure)
+        shown = np.clip(VIEWS[look.view](light), 0, 1)
+        # Twice as precise for 16 bits: half a step of a float at 1 is a 512th of a step there.
+        result[start : start + rows] = np.rint(shown.astype(np.float64) * top)
     return result
 
 
@@ -92,6 +132,29 @@ def write_bytes(path: Path, pixels: Bytes) -> None:
         Image.fromarray(pixels).save(temporary, format="PNG", optimize=pixels.size < 1 << 23)
 
 
+def write_values(path: Path, pixels: Values, view: str) -> None:
+    """Write display values (H, W, 3) of a view as PNG or TIFF, whole or not at all (OutputError)."""
+    kind = FORMATS.get(path.suffix.lower())
+    if kind is None:
+        raise OutputError(Problem("a picture's name must end in .png, .tif or .tiff", file=str(path)))
+    if kind == "png" and pixels.dtype == np.uint8:
+        write_bytes(path, pixels.astype(np.uint8, copy=False))
+        return
+    import OpenImageIO
+
+    height, width, _ = pixels.shape
+    spec = OpenImageIO.ImageSpec(width, height, 3, str(pixels.dtype))
+    spec.attribute("oiio:ColorSpace", "lin_rec709_scene" if view == "raw" else "srgb_rec709_scene")
+    spec.attribute("compression", "zip")
+    with whole_file(path) as temporary:
+        temporary.touch()  # so that what the system has against it is told in its own words
+        file: Any = OpenImageIO.ImageOutput.create(kind)
+        good = file.open(str(temporary), spec) and file.write_image(np.ascontiguousarray(pixels))
+        if not (file.close() and good):
+            said = " ".join(file.geterror().split()) or "the file is not whole"
+            raise OutputError(Problem(f"cannot be written: {said}", file=str(path)))
+
+
 def block_means(image: NDArray[Any], factor: int) -> Float32Array:
     """Means (⌈H/n⌉, ⌈W/n⌉, C) over n × n pixels of an image (H, W, C); blocks at the far ends may be cut."""
     rows, columns = (np.arange(0, length, factor) for length in image.shape[:2])
@@ -103,27 +166,72 @@ def block_means(image: NDArray[Any], factor: int) -> Float32Array:
     return result
 
 
-def preview_paths(images: Sequence[Path], output: Path) -> list[tuple[Path, Path]]:
-    """Every image with the PNG it becomes: the one named, or one of its own name in the folder `output`.
+def preview_paths(images: Sequence[Path], output: Path, kind: str | None = None) -> list[tuple[Path, Path]]:
+    """Every image with the picture it becomes: the one named, or one of its own name in the folder `output`.
+
+    Args:
+        images: EXR images; a run of `#` in a name stands for the frame numbers there are.
+        output: a picture or a folder, which is made.
+        kind: `png` or `tiff`; None goes by the picture's name, and in folders for PNG.
 
     Raises:
-        OutputError: several images and one picture, or two images of one name.
+        OutputError: several images and one picture, or two images of one name, or no image of a sequence.
     """
-    if output.suffix.lower() == ".png":
-        if len(images) > 1:
-            wrong = f"is one picture for {len(images)} images, expected a folder"
+    images = _every_frame(images)
+    named = FORMATS.get(output.suffix.lower())
+    if named is None:
+        pairs = [(image, output / f"{image.stem}.{'tif' if kind == 'tiff' else 'png'}") for image in images]
+        if len({picture for _, picture in pairs}) < len(pairs):
+            wrong = "two images of the same name would become one picture"
             raise OutputError(Problem(wrong, file=str(output)))
-        make_folder(output.parent)
-        return [(images[0], output)]
-    pairs = [(image, output / f"{image.stem}.png") for image in images]
-    if len({picture for _, picture in pairs}) < len(pairs):
-        raise OutputError(Problem("two images of the same name would become one picture", file=str(output)))
-    make_folder(output)
-    return pairs
+        make_folder(output)
+        return pairs
+    if len(images) > 1:
+        wrong = f"is one picture for {len(images)} images, expected a folder"
+        raise OutputError(Problem(wrong, file=str(output)))
+    if kind not in (None, named):
+        raise OutputError(Problem(f"is a name for a {named} picture, not for {kind}", file=str(output)))
+    make_folder(output.parent)
+    return [(images[0], output)]
 
 
-def preview(image: Path, picture: Path, view: str = "aces", exposure: float = 0.0) -> tuple[int, int]:
-    """Write a PNG of an EXR image's colours, scaled down to at most `LARGEST` pixels a side.
+def _every_frame(images: Sequence[Path]) -> list[Path]:
+    """The images, sequences such as `page_01.####.exr` as all their frames, by number."""
+    found = [list(_frames(path)) if _FIELD.search(path.name) else [path] for path in images]
+    missing = [path for path, frames in zip(images, found, strict=True) if not frames]
+    raise_all(OutputError, (Problem("there is no image of this sequence", str(path)) for path in missing))
+    return [path for frames in found for path in frames]
+
+
+def _frames(pattern: Path) -> Iterator[Path]:
+    before, after = (re.escape(part) for part in _FIELD.split(pattern.name, maxsplit=1))
+    name = re.compile(f"{before}(-?\\d+){after}")
+    known = ((name.fullmatch(path.name), path) for path in pattern.parent.glob("*"))
+    yield from (path for _, path in sorted((int(match[1]), path) for match, path in known if match))
+
+
+def image_colors(image: Path) -> NDArray[Any]:
+    """Colours (H, W, 3) of an EXR image's whole frame.
+
+    Raises:
+        OutputError: the image cannot be read or has no colours.
+    """
+    channels = whole_frame(read_exr(image))
+    if missing := [name for name in "RGB" if name not in channels]:
+        have = ", ".join(channels)
+        wrong = f"has no channel {missing[0]}, expected R, G and B (it has {have})"
+        raise OutputError(Problem(wrong, file=str(image)))
+    return np.stack([channels[name] for name in "RGB"], axis=-1)
+
+
+def scaled_down(rgb: NDArray[Any], largest: int) -> NDArray[Any]:
+    """An image (H, W, 3) scaled down by a whole number to at most `largest` pixels a side; 0 for as it is."""
+    factor = -(-max(rgb.shape[:2]) // largest) if largest else 1
+    return block_means(rgb, factor) if factor > 1 else rgb
+
+
+def preview(image: Path, picture: Path, look: Look | None = None) -> tuple[int, int]:
+    """Write a picture of an EXR image's colours.
 
     Returns:
         Width and height of the picture.
@@ -131,12 +239,7 @@ def preview(image: Path, picture: Path, view: str = "aces", exposure: float = 0.
     Raises:
         OutputError: the image cannot be read or has no colours, or the picture cannot be written.
     """
-    channels = whole_frame(read_exr(image))
-    if missing := [name for name in "RGB" if name not in channels]:
-        have = ", ".join(channels)
-        wrong = f"has no channel {missing[0]}, expected R, G and B (it has {have})"
-        raise OutputError(Problem(wrong, file=str(image)))
-    rgb = np.stack([channels[name] for name in "RGB"], axis=-1)
-    small = block_means(rgb, -(-max(rgb.shape[:2]) // LARGEST))
-    write_png(picture, small, view, exposure)
+    look = look or Look()
+    small = scaled_down(image_colors(image), look.largest)
+    write_values(picture, display_values(small, look), look.view)
     return small.shape[1], small.shape[0]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import OpenImageIO
 import pytest
 from click.testing import CliRunner
 from PIL import Image
@@ -9,7 +10,17 @@ import quiltcli.preview as module
 from quiltcli.cli import main
 from quiltcli.errors import OutputError
 from quiltcli.exr import write_exr
-from quiltcli.preview import block_means, preview, tone_map, write_bytes, write_png
+from quiltcli.preview import (
+    Look,
+    block_means,
+    display_values,
+    preview,
+    preview_paths,
+    tone_map,
+    write_bytes,
+    write_png,
+    write_values,
+)
 
 
 def grey(*values):
@@ -80,7 +91,7 @@ def test_an_unknown_configuration_is_an_error_not_a_picture(monkeypatch):
 def test_preview_scales_large_images_down(tmp_path):
     half = np.full((4, 4100), 0.25, np.float16)
     write_exr(tmp_path / "page.exr", dict.fromkeys("RGBA", half), {})
-    assert preview(tmp_path / "page.exr", tmp_path / "page.png", "srgb") == (1367, 2)
+    assert preview(tmp_path / "page.exr", tmp_path / "page.png", Look("srgb")) == (1367, 2)
     shown = np.asarray(Image.open(tmp_path / "page.png"))
     assert shown.shape == (2, 1367, 3)
     assert (shown == 137).all()
@@ -101,3 +112,72 @@ def test_command_names_pictures_after_their_images(tmp_path):
     result = CliRunner().invoke(main, [*arguments, str(tmp_path / "one.png")])
     assert result.exit_code == 2
     assert "is one picture for 2 images, expected a folder" in result.output
+
+
+# --- pictures of 16 bits ---
+
+
+def test_sixteen_bits_hold_the_curve_of_the_standard():
+    # Half a step off the closed form at most: the light is single precision, the steps are a 65535th.
+    light = np.linspace(0, 1, 4001, dtype=np.float32)
+    curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light.astype(float) ** (1 / 2.4) - 0.055)
+    shown = display_values(grey(*light), Look("srgb", depth=16))
+    assert shown.dtype == np.uint16
+    assert np.abs(shown[0, :, 0] - 65535 * curve).max() < 0.51
+
+
+def test_raw_is_the_light_itself():
+    light = grey(0, 0.25, 1 / 65535, 1, 3, np.nan)
+    assert display_values(light, Look("raw", depth=16))[0, :, 1].tolist() == [0, 16384, 1, 65535, 65535, 0]
+
+
+def test_strips_are_no_matter(monkeypatch):
+    light = np.random.default_rng(1).random((50, 7, 3)).astype(np.float32)
+    whole = display_values(light, Look(depth=16))
+    monkeypatch.setattr(module, "_STRIP", 40)
+    assert (display_values(light, Look(depth=16)) == whole).all()
+
+
+@pytest.mark.parametrize(("name", "depth"), [("a.png", 16), ("a.tif", 16), ("a.tiff", 8), ("a.png", 8)])
+def test_a_picture_holds_every_value(tmp_path, name, depth):
+    kind = np.uint8 if depth == 8 else np.uint16
+    pixels = np.random.default_rng(2).integers(0, 2**depth, (5, 7, 3)).astype(kind)
+    written = []
+    for _ in range(2):
+        write_values(tmp_path / name, pixels, "srgb")
+        written.append((tmp_path / name).read_bytes())
+    assert written[0] == written[1]
+    image = OpenImageIO.ImageBuf(str(tmp_path / name))
+    assert str(image.spec().format) == str(np.dtype(kind))
+    assert (image.get_pixels(OpenImageIO.UINT16 if depth == 16 else OpenImageIO.UINT8) == pixels).all()
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_picture_that_cannot_be_written_says_why(tmp_path):
+    with pytest.raises(OutputError, match=r"none/a\.tif: cannot be written: No such file or directory$"):
+        write_values(tmp_path / "none" / "a.tif", np.zeros((2, 2, 3), np.uint16), "srgb")
+    with pytest.raises(OutputError, match=r"a\.jpg: a picture's name must end in \.png, \.tif or \.tiff"):
+        write_values(tmp_path / "a.jpg", np.zeros((2, 2, 3), np.uint16), "srgb")
+
+
+def test_deliverables_of_a_sequence_keep_every_pixel(tmp_path):
+    for frame in (2, 10, 9):
+        half = np.full((3, 2100), frame / 16, np.float16)
+        write_exr(tmp_path / f"page_01.{frame:04d}.exr", dict.fromkeys("RGB", half), {})
+    arguments = ["preview", str(tmp_path / "page_01.####.exr"), "-o", str(tmp_path / "out"), "--depth", "16"]
+    result = CliRunner().invoke(main, [*arguments, "--format", "tiff", "--view", "raw"])
+    assert result.exit_code == 0
+    names = [f"page_01.{frame:04d}.tif" for frame in (2, 9, 10)]
+    assert result.output == "".join(f"{tmp_path / 'out' / name}  2100×3\n" for name in names)
+    image = OpenImageIO.ImageBuf(str(tmp_path / "out" / names[1]))
+    assert (image.get_pixels(OpenImageIO.UINT16) == round(9 / 16 * 65535)).all()
+
+
+def test_a_sequence_of_nothing_is_an_error(tmp_path):
+    with pytest.raises(OutputError, match="there is no image of this sequence"):
+        preview_paths([tmp_path / "page.####.exr"], tmp_path / "out")
+
+
+def test_a_name_and_a_format_that_disagree(tmp_path):
+    with pytest.raises(OutputError, match="is a name for a png picture, not for tiff"):
+        preview_paths([tmp_path / "a.exr"], tmp_path / "a.png", "tiff")
