@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from yaml.cyaml import CParser  # type: ignore[attr-defined]
 
-from quiltcli.yamlsyntax import CoreResolver
+from quiltcli.yamlcore import CoreResolver
 
 
 class FastLoader(CParser, CoreResolver):

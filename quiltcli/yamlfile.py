@@ -14,7 +14,8 @@ from typing import Any, ClassVar, TypeAlias
 import yaml
 
 from quiltcli.errors import JobError, Problem
-from quiltcli.yamlsyntax import CORE, compose, place, read_text
+from quiltcli.yamlcore import CORE
+from quiltcli.yamlsyntax import compose, place, read_text
 
 Key: TypeAlias = tuple[str | int, ...]
 _MAX_VALUES = 5_000_000

@@ -1,8 +1,4 @@
-"""YAML text to nodes: the scalars of YAML 1.2, and syntax errors in words that help.
-
-Scalars follow the YAML 1.2 core schema, whatever PyYAML does by default: `1e3` is a number, only
-`true` and `false` are booleans, `1:30` and `2024-01-01` are text.
-"""
+"""YAML text to nodes, with syntax errors in words that help."""
 
 from __future__ import annotations
 
@@ -14,30 +10,10 @@ import yaml
 from yaml.composer import Composer
 from yaml.parser import Parser
 from yaml.reader import Reader, ReaderError
-from yaml.resolver import BaseResolver
 from yaml.scanner import Scanner
 
 from quiltcli.errors import JobError, Problem
-
-CORE = "tag:yaml.org,2002:"
-
-
-class CoreResolver(BaseResolver):
-    """Plain scalars become what YAML 1.2's core schema says (https://yaml.org/spec/1.2.2/#103-core-schema)."""
-
-
-for _tag, _pattern, _first in (
-    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
-    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
-    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", list("-+0123456789")),
-    (
-        "float",
-        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
-        list("-+.0123456789"),
-    ),
-    ("merge", r"<<", ["<"]),
-):
-    CoreResolver.add_implicit_resolver(CORE + _tag, re.compile(rf"(?:{_pattern})\Z"), _first)
+from quiltcli.yamlcore import CoreResolver
 
 
 class _Loader(Reader, Scanner, Parser, Composer, CoreResolver):

@@ -10,7 +10,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "quiltcli"
 ORDER = (
-    *("errors", "wholefile", "geometry", "yamlsyntax", "yamlfast", "yamlfile", "frames", "job"),
+    *("errors", "wholefile", "geometry", "yamlcore", "yamlfast", "yamlsyntax", "yamlfile", "frames", "job"),
     *("meshfile", "display", "layout", "packing", "viewercsv", "viewerpath", "viewer", "eyes", "scene"),
     *("camera", "binning", "homography", "orders", "raster", "rays", "shading", "channels"),
     *(
@@ -29,8 +29,6 @@ ORDER = (
     *("draw", "methods", "pool", "outputs", "interrupt", "render"),
     *("verify", "preview", "simulate", "view", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
 )
-# The fast reader is built on the slow one's resolver, and taken by it where libyaml is there.
-OPTIONAL = {("quiltcli.yamlsyntax", "quiltcli.yamlfast")}
 LIGHT = {"quiltcli.errors", "quiltcli"}
 
 
@@ -93,7 +91,7 @@ def test_a_module_imports_only_modules_before_it(path: Path) -> None:
         assert own(imports(path)) == set()
         return
     later = {(module, name) for name in own(imports(path)) if place(name) > place(module)}
-    assert later - OPTIONAL == set()
+    assert later == set()
 
 
 def test_files_of_a_folder_import_one_another_in_no_circle() -> None:

@@ -16,7 +16,7 @@ from yaml.serializer import Serializer
 from quiltcli.frames import format_frames
 from quiltcli.job.base import Model
 from quiltcli.job.render import JobFile
-from quiltcli.yamlsyntax import CoreResolver
+from quiltcli.yamlcore import CoreResolver
 
 
 class _Dumper(Emitter, Serializer, SafeRepresenter, CoreResolver):
