@@ -53,7 +53,7 @@ def out(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def written(out):
-    return view(out, [2, 1], out.parent / "two.html", ViewOptions(errors=True))
+    return view(out, [2, 1], out.parent / "two.html")
 
 
 def data_of(path: Path):
@@ -146,7 +146,9 @@ def test_data_in_a_page_can_be_neither_tag_nor_comment():
 
 
 def test_errors_are_those_of_the_simulation(out, written, tmp_path):
-    (entry, _) = data_of(written.page)["frames"]
+    assert [entry["heat"] for entry in data_of(written.page)["frames"]] == [None, None]
+    options = ViewOptions(errors=True, model=False)
+    (entry,) = data_of(view(out, [2], tmp_path / "a.html", options).page)["frames"]
     heat = tmp_path / "heat.png"
     arguments = ["-f", "2", "--size", "800x600", "-o", str(tmp_path / "eye.png"), "--heat-map", str(heat)]
     result = CliRunner().invoke(main, ["simulate", str(out.parent / "job.yaml"), *arguments])
@@ -274,11 +276,8 @@ def test_half_a_frame_is_refused(tmp_path):
 
 @pytest.mark.parametrize("model", ["cube5", "cave5", "dodecahedron"])
 def test_triangles_turn_to_the_lit_side_and_cover_the_facets(model):
-    from quiltcli.job import PackSpec
-    from quiltcli.packing import layout_for
-
-    facets, layout = layout_for(PackSpec(), load_display(load_display_file(MODELS / f"{model}.yaml")))
-    mesh = display_mesh(facets, layout)
+    facets = load_display(load_display_file(MODELS / f"{model}.yaml"))
+    mesh = display_mesh(facets, placed(facets, [moved(0, 0)] * facets.count, (9999, 9999)))
     a, b, c = (mesh.position[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     across = np.cross(b - a, c - a)
     assert (np.einsum("tk,tk->t", across, facets.normal[mesh.facet]) > 0).all()
