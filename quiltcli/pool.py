@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.channels import exr_channels
-from quiltcli.draw import Buffers, Stage, draw_batch
+from quiltcli.draw import Buffers, Stage, draw_batch, in_threads
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
 from quiltcli.homography import quilt_rays
@@ -182,10 +182,6 @@ class Pool:
             worker.process.join()
         self._workers = []
 
-    def fits(self, frame: Frame) -> bool:
-        """Whether the arena has room for the frame's pairs."""
-        return bool(frame.pairs.triangle.size <= self._arena.triangle.size)
-
     def draw(self, frame: Frame, batches: Sequence[tuple[int, int]], buffers: Buffers) -> int:
         """Draw batches into one of the pool's buffers.
 
@@ -196,6 +192,8 @@ class Pool:
             CheckFailedError: a worker died.
         """
         pairs = frame.pairs
+        if pairs.triangle.size > self._arena.triangle.size:
+            return in_threads(self._stage, len(self._workers))(frame, batches, buffers)
         self._arena.vertices[:] = frame.sight.vertices
         self._arena.cut[:] = frame.sight.cut
         self._arena.start[:] = pairs.start

@@ -72,6 +72,16 @@ def test_workers_draw_the_same_pixels_as_one_process(stage):
                 np.testing.assert_array_equal(alone[name], together[name], err_msg=name)
 
 
+def test_more_pairs_than_there_is_room_for_are_drawn_all_the_same(stage, monkeypatch):
+    monkeypatch.setattr(pools, "_ROOM", 0)
+    monkeypatch.setattr(pools, "_LEAST_ROOM", 100)
+    alone, together = new_buffers(stage), shared_buffers(stage)
+    with Pool(stage, [together], 2) as pool:
+        draw_frame(stage, viewer(EYES[0]), alone)
+        draw_frame(stage, viewer(EYES[0]), together, run=pool.draw)
+    np.testing.assert_array_equal(alone["Z"], together["Z"])
+
+
 def children() -> set[int]:
     return {int(pid) for pid in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()}
 
