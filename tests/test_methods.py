@@ -266,11 +266,8 @@ def test_rays_show_what_the_rasterizer_shows(plates) -> None:
     assert record.lit_facets == other.lit_facets == np.count_nonzero(lit_facets(stage.facets, viewer.eye))
     seen = np.isfinite(exact["Z"])
     assert (np.isfinite(cast["Z"]) == seen).all()
-    # The rasterizer's samples lie a millionth of a pixel beside the centres: edge-on, that is depth.
-    for name in ("Z", "P.X", "P.Y", "P.Z"):
-        off = np.abs(cast[name][seen].astype(np.float64) - exact[name][seen])
-        assert off.max() < 1e-6
-        assert np.median(off) < 1e-9
+    for name in ("Z", "P.X", "P.Y", "P.Z"):  # a step of single precision
+        np.testing.assert_allclose(cast[name][seen], exact[name][seen], rtol=2e-7, atol=2e-8)
     for name in ("R", "G", "B", "N.X"):
         np.testing.assert_allclose(cast[name], exact[name], rtol=1.1e-3, atol=1e-3)
 
