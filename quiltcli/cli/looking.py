@@ -15,9 +15,8 @@ from quiltcli.cli.printing import print_aligned
 @main.command()
 @click.argument("job", type=PATH)
 @click.option("-f", "--frames", type=FRAMES, help="Frames such as 7 or 1-12; the job's first by default.")
-@click.option(
-    "-o", "--output", type=PATH, required=True, help="PNG to write; #### in its name is the frame number."
-)
+@click.option("-o", "--output", type=PATH, help="PNG to write; #### in its name is the frame number.")
+@click.option("--video", type=PATH, help="Film to write of all the frames, as .mp4 or .mov.")
 @click.option("--size", type=SIZE, default="1200x900", show_default=True, help="Size of the picture.")
 @click.option("--from", "place", type=POINT, metavar="X,Y,Z", help="Look from here; from the eye by default.")
 @click.option("--look-at", type=POINT, metavar="X,Y,Z", help="Look there; at the display by default.")
@@ -26,7 +25,11 @@ from quiltcli.cli.printing import print_aligned
 @click.option(
     "--supersample", type=click.IntRange(1, 16), default=2, show_default=True, help="Rays across a pixel."
 )
-@click.option("--compare/--no-compare", default=True, help="From the eye, compare with a direct picture.")
+@click.option(
+    "--compare/--no-compare",
+    default=None,
+    help="From the eye, compare with a direct picture; not for a film alone.",
+)
 @click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
 @click.option("--direct", type=PATH, help="Write the direct picture, as PNG.")
 @click.option("--heat-map", type=PATH, help="Write a picture of the errors, as PNG.")
@@ -46,9 +49,12 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
     from quiltcli.simulate import PictureOptions
     from quiltcli.simulate.files import Pictures, write_pictures
 
-    pictures = Pictures(
-        how.pop("output"), how.pop("direct"), how.pop("heat_map"), how.pop("view"), how.pop("exposure")
-    )
+    wanted = ("direct", "heat_map", "view", "exposure", "video")
+    pictures = Pictures(how.pop("output"), **{name: how.pop(name) for name in wanted})
+    if pictures.picture is None and pictures.video is None:
+        raise click.UsageError("nothing to write: give -o PICTURE.png, --video FILM.mp4, or both")
+    if how["compare"] is None:
+        how["compare"] = any((pictures.picture, pictures.direct, pictures.heat_map))
     if how["size"] is None:
         raise click.UsageError("--size: a picture needs a width and a height")
     options = PictureOptions(samples=how.pop("supersample"), threads=how.pop("threads") or 0, **how)
@@ -99,11 +105,27 @@ def compare(
 @click.option("-f", "--frames", type=FRAMES, help="Frames such as 7 or 1-12; all that are there by default.")
 @click.option("-o", "--output", type=PATH, help="Page to write, as .html; OUT/view.html by default.")
 @click.option("--model/--no-model", default=True, help="Write a model beside it, as .glb.")
-@click.option("--filter", type=click.Choice(("nearest", "linear")), default="linear", show_default=True)
+@click.option(
+    "--filter",
+    type=click.Choice(("nearest", "linear")),
+    default="linear",
+    show_default=True,
+    help="At first.",
+)
 @click.option("--errors", is_flag=True, help="Hold every frame against a direct picture, as a heat map.")
-@click.option("--ghost", type=click.IntRange(min=0), default=20000, show_default=True, metavar="TRIANGLES")
-@click.option("--texture", type=click.IntRange(64, 16384), default=4096, show_default=True, metavar="PIXELS")
-@click.option("--max-mb", "size", type=click.FloatRange(min=1), default=8.0, show_default=True)
+@click.option(
+    "--ghost",
+    type=click.IntRange(min=0),
+    default=20000,
+    show_default=True,
+    help="Most triangles of the scene.",
+)
+@click.option(
+    "--texture", type=click.IntRange(64, 16384), default=4096, show_default=True, help="Most pixels a side."
+)
+@click.option(
+    "--max-mb", "size", type=click.FloatRange(min=1), default=8.0, show_default=True, help="Size of the page."
+)
 @click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")
 @click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
 def view(out: Path, frames: tuple[int, ...] | None, output: Path | None, **how: Any) -> None:

@@ -64,13 +64,16 @@ def _display(gltf: Gltf, mesh: DisplayMesh, lit: BoolArray, pages: Sequence[Pict
     shows = lit[mesh.facet]
     parts = []
     for page, picture in enumerate(pages):
+        triangles = mesh.triangles[shows & (mesh.page[mesh.facet] == page)]
+        if not len(triangles):
+            continue
         texture = gltf.add("textures", sampler=sampler, source=gltf.image(picture))
         material = gltf.unlit(
             f"page {page + 1}",
             pbrMetallicRoughness={"baseColorTexture": {"index": texture}},
             doubleSided=mesh.both_sides,
         )
-        parts.append((mesh.triangles[shows & (mesh.page[mesh.facet] == page)], textured, material))
+        parts.append((triangles, textured, material))
     dark = gltf.unlit("dark", pbrMetallicRoughness={"baseColorFactor": _DARK}, doubleSided=True)
     parts.append((mesh.triangles[~shows], plain, dark))
     if not mesh.both_sides:
