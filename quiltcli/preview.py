@@ -146,6 +146,7 @@ def write_values(path: Path, pixels: Values, view: str) -> None:
     spec = OpenImageIO.ImageSpec(width, height, 3, str(pixels.dtype))
     spec.attribute("oiio:ColorSpace", "lin_rec709_scene" if view == "raw" else "srgb_rec709_scene")
     spec.attribute("compression", "zip")
+    spec.attribute("DateTime", "    :  :     :  :  ")  # unknown: the library would write today's
     with whole_file(path) as temporary:
         temporary.touch()  # so that what the system has against it is told in its own words
         file: Any = OpenImageIO.ImageOutput.create(kind)

@@ -27,7 +27,8 @@ ORDER = (
         "diff",
     ),
     *("draw", "methods", "pool", "outputs", "interrupt", "render"),
-    *("verify", "preview", "simulate", "view", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
+    *("verify", "preview", "contact", "video"),
+    *("simulate", "view", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
 )
 LIGHT = {"quiltcli.errors", "quiltcli"}
 

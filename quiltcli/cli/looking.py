@@ -180,6 +180,27 @@ def preview(
 
 
 @main.command()
+@click.argument("out", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="Sheet to write, as .png or .tif.")
+@click.option("-f", "--frames", type=FRAMES, help="Frames; all of pages, the first of facets by default.")
+@click.option("--pages", "kind", flag_value="page", help="Pages of the quilt, the default if there are any.")
+@click.option("--facets", "kind", flag_value="facet", help="Images of facets.")
+@click.option("--columns", type=click.IntRange(min=1), help="Images in a row.")
+@click.option("--width", type=click.IntRange(16, 4096), default=240, show_default=True, metavar="PIXELS")
+@click.option("--view", type=STILL_VIEW, default="aces", show_default=True, help="How light becomes colour.")
+@click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
+def contact(out: Path, output: Path, view: str, exposure: float, **how: Any) -> None:
+    """Lay the images in the output folder OUT of a render side by side, small, with their names."""
+    from quiltcli.contact import Sheet, contact_sheet
+    from quiltcli.preview import Look
+    from quiltcli.wholefile import make_folder
+
+    make_folder(output.parent)
+    count, (width, height) = contact_sheet(out, output, Sheet(look=Look(view, exposure), **how))
+    click.echo(f"{output}  {width}×{height}, {count} image{'s' * (count > 1)}")
+
+
+@main.command()
 @click.argument("display", type=PATH)
 @click.option("--eye", type=POINT, metavar="X,Y,Z", help="The eye the content is drawn for.")
 @click.option("--job", type=PATH, help="Take the eye of this job …")

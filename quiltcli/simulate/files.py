@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from quiltcli.errors import JobError, OutputError, Problem
 from quiltcli.frames import frame_text
 from quiltcli.job import JobFile
-from quiltcli.preview import write_bytes, write_png
+from quiltcli.preview import Look, display_values, write_bytes, write_png
 from quiltcli.simulate import PictureOptions, Simulation, simulate
 from quiltcli.simulate.compare import figures, heat_map, heat_scale
+from quiltcli.video import coding_of, film
 from quiltcli.wholefile import make_folder
 
 _NUMBER = re.compile("#+")
@@ -23,17 +25,19 @@ class Pictures:
     """What is written of each frame; a run of `#` in a name stands for the frame number.
 
     Attributes:
-        picture: what is seen of the display.
+        picture: what is seen of the display, if wanted.
         direct: the scene without a display, if wanted.
         heat_map: the errors, if wanted.
         view, exposure: as for `preview.write_png`.
+        video: a film of what is seen, all frames after one another, if wanted.
     """
 
-    picture: Path
+    picture: Path | None = None
     direct: Path | None = None
     heat_map: Path | None = None
     view: str = "aces"
     exposure: float = 0.0
+    video: Path | None = None
 
 
 def write_pictures(
@@ -45,17 +49,34 @@ def write_pictures(
         QuiltError: bad input, or a file that cannot be written.
     """
     _check(frames, options, pictures)
-    for result in simulate(job, frames, options):
-        written = numbered(pictures.picture, result.frame)
-        make_folder(written.parent)
-        write_png(written, result.picture, pictures.view, pictures.exposure)
-        yield f"{'picture':<24}{written}"
-        yield f"{'images':<24}{result.source}"
-        yield from _write_comparison(result, pictures)
+    with ExitStack() as ends:
+        show = ends.enter_context(film(pictures.video, job.fps)) if pictures.video else None
+        for result in simulate(job, frames, options):
+            if show and pictures.video:
+                look = Look(pictures.view, pictures.exposure, coding_of(pictures.video).depth)
+                show(display_values(result.picture, look))
+            yield from _write_picture(result, pictures)
+            yield from _write_comparison(result, pictures)
+    if pictures.video:
+        yield f"{'film':<24}{pictures.video} ({len(frames)} frames, {job.fps} a second)"
+
+
+def _write_picture(result: Simulation, pictures: Pictures) -> Iterator[str]:
+    """Write what is seen of the display, and say where from."""
+    if pictures.picture is None:
+        yield f"{'frame':<24}{result.frame}, {result.source}"
+        return
+    written = numbered(pictures.picture, result.frame)
+    make_folder(written.parent)
+    write_png(written, result.picture, pictures.view, pictures.exposure)
+    yield f"{'picture':<24}{written}"
+    yield f"{'images':<24}{result.source}"
 
 
 def _check(frames: Sequence[int], options: PictureOptions, pictures: Pictures) -> None:
     """Find what cannot work before anything is drawn."""
+    if pictures.video is not None:
+        coding_of(pictures.video)
     names = [path for path in (pictures.picture, pictures.direct, pictures.heat_map) if path is not None]
     for path in names:
         if path.suffix.lower() != ".png":
@@ -63,7 +84,7 @@ def _check(frames: Sequence[int], options: PictureOptions, pictures: Pictures) -
         if len(frames) > 1 and not _NUMBER.search(path.name):
             wrong = f"is one name for {len(frames)} frames (put #### where the frame number goes)"
             raise OutputError(Problem(wrong, file=str(path)))
-    if len(names) > 1 and (options.place is not None or not options.compare):
+    if names != [pictures.picture] * len(names) and (options.place is not None or not options.compare):
         raise JobError("--direct and --heat-map need a comparison, which there is only from the viewer's eye")
 
 
