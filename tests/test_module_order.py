@@ -28,7 +28,7 @@ ORDER = (
     ),
     *("draw", "methods", "pool", "outputs", "interrupt", "render"),
     *("verify", "preview", "contact", "video"),
-    *("simulate", "view", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
+    *("simulate", "view", "compare", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
 )
 LIGHT = {"quiltcli.errors", "quiltcli"}
 
