@@ -53,14 +53,9 @@ class DepthOrder:
     height: FloatArray
     factor: FloatArray
 
-    @property
-    def clips(self) -> bool:
-        """Whether the method has a depth range of its own beside the viewer's near and far."""
-        return self.method != "homography"
-
     def gain(self, x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
         """Depth as this method measures it from the eye, of directions or points given by axis."""
-        if self.viewer.depth == "radial" and not self.clips:
+        if self.viewer.depth == "radial" and self.method == "homography":
             return np.asarray(np.sqrt(x * x + y * y + z * z))
         look = self.viewer.look
         return np.asarray(look[0] * x + look[1] * y + look[2] * z)
@@ -83,9 +78,10 @@ class DepthOrder:
 
     def keeps(self, gain: FloatArray, canonical: FloatArray) -> BoolArray:
         """Fragments that the method does not clip."""
-        if not self.clips:
+        if self.method == "homography":
             return np.asarray(gain > 0)
-        return np.asarray((np.abs(canonical) <= 1) & (gain > 0))
+        within = np.abs(canonical) <= 1
+        return np.asarray(within if self.method == "offaxis" else within & (gain > 0))
 
     def stored(self, hits_facet: Int32Array, position: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What the buffer holds for points that are seen, and what it is taken for.

@@ -284,6 +284,31 @@ def test_rays_cull_and_keep_to_near_and_far(plates) -> None:
         assert (exact["triangle"] == 0).any()
 
 
+def test_rays_take_the_lowest_of_triangles_at_one_depth(tmp_path: Path) -> None:
+    """Two coats on one wall, cut along different diagonals: numbers differ in their last bits only."""
+    (tmp_path / "coats.obj").write_text(
+        "v -1 -1 -1\nv 1 -1 -1\nv 1.1 1 -0.3\nv -0.9 1 -0.3\nf 1 2 3\nf 1 3 4\nf 2 3 4\nf 2 4 1\n"
+    )
+    job = write_tiny_job(tmp_path)
+    job = load_job(job, (f"scene={tmp_path / 'coats.obj'}", "output.channels=[Z, triangle]"))
+    stage, viewer = set_stage(job), viewer_at(job.viewer, 2)
+    cast, exact = (by(stage, viewer, method)[0] for method in ("raycast", "homography"))
+    assert set(np.unique(exact["triangle"])) == {0, 1, 2}
+    assert (cast["triangle"] == exact["triangle"]).all()
+
+
+def test_off_axis_shows_what_is_behind_the_view_plane_where_depth_is_radial() -> None:
+    eye = rig.viewer((0, 0, 0), at=(0, 0, -1), near=0.1, far=50, depth="radial")
+    vertices, triangles = rig.icosphere(2)
+    inward = rig.cube(20, viewing_side="back")
+    shown = rig.picture(inward, vertices * 3, triangles, eye)
+    assert (shown.triangle[shown.mine] >= 0).all()
+    assert (drawn(shown, depth_order("offaxis", None, eye, shown.facets, shown.rays)) == shown.triangle).all()
+    scaled = drawn(shown, depth_order("zscale", None, eye, shown.facets, shown.rays))
+    ahead = rig.pixel_rays(shown, np.flatnonzero(shown.mine)) @ eye.look > 0
+    assert (scaled[shown.mine] >= 0).tolist() == ahead.tolist()
+
+
 def test_only_some_facets_are_drawn_and_the_others_left(plates) -> None:
     stage, viewer = plates
     for method in ("raycast", "twopass"):

@@ -14,14 +14,14 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
 from quiltcli.homography import QuiltRays
 from quiltcli.job.base import either
 from quiltcli.job.render import DEPTH_BITS
+from quiltcli.methods.raycast import RESOLUTION
 from quiltcli.rays.embree import Target, plane_depth
 from quiltcli.rays.place import places
 from quiltcli.simulate.compare import Comparison
 from quiltcli.verify.seams import Seams
 
 _CHUNK = 1 << 18
-RESOLUTION = 2.0**-28
-"""Share of a depth within which exact depth keys hold two surfaces for as near as each other."""
+_SAME = 4 * RESOLUTION  # of a depth: nobody can say which of two surfaces is nearer
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ def _part(
     nearest = np.full(differ.size, -np.inf)
     hit = right[differ] >= 0
     nearest[hit] = plane_depth(target, right[differ][hit], directions[hit])
-    beyond = far > nearest + RESOLUTION * np.abs(np.where(hit, nearest, 0.0))
+    beyond = far > nearest + _SAME * np.abs(np.where(hit, nearest, 0.0))
     wrong = np.zeros(at.size, dtype=np.bool_)
     wrong[differ] = beyond
     behind = np.zeros(at.size)

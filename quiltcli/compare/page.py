@@ -111,7 +111,9 @@ def _profile(study: Study) -> Iterator[str]:
         kept = finest.get(found.variant.method)
         if kept is None or found.variant.bits == "24":
             finest[found.variant.method] = Curve(found.variant.name, depths, found.variant == REFERENCE)
-    chart = line_chart(along, list(finest.values()), labels, mark=0.0)
+    # The truth goes last, in dashes: what follows it shows through.
+    curves = sorted(finest.values(), key=lambda curve: curve.dashed)
+    chart = line_chart(along, curves, labels, mark=0.0)
     yield from _section("Depth across a seam", "profile", chart, *study.profile.facets)
     truth = study.depths[0]
     near = [

@@ -22,7 +22,7 @@ from quiltcli.geometry import BoolArray, FloatArray, IntArray, cross, dot
 from quiltcli.homography import quilt_rays
 from quiltcli.raster import Hits
 from quiltcli.raster.planes import LATTICE
-from quiltcli.rays.embree import Target, aim, cast, plane_distance
+from quiltcli.rays.embree import Target, aim, cast, plane_depth, plane_distance
 from quiltcli.rays.exact import Neighbours, intersect
 from quiltcli.rays.place import OFFSETS, Places, places
 from quiltcli.report import FrameRecord
@@ -30,6 +30,8 @@ from quiltcli.viewer import Viewer
 
 _CHUNK = 1 << 15
 _BEHIND = 1e-5  # share of a distance within which a second surface is looked for
+RESOLUTION = 2.0**-30
+"""Share of a depth within which the rasterizer's keys hold two surfaces for as near as each other."""
 
 
 def cast_frame(
@@ -144,15 +146,18 @@ def _nearest(
 ) -> IntArray:
     """The nearest triangle (N,) of those named (k, N), and those that touch them, that the sample lies in.
 
-    Pixels are sampled where the rasterizer samples them, so that both decide centres on edges alike;
-    of triangles at one depth the lowest is taken.
+    Samples lie where the rasterizer's do, so that both decide centres on edges alike; depth is the
+    centre's, and of triangles at one depth the lowest is taken, as there.
     """
     which, column = np.nonzero(named.T >= 0)
     result = np.full(rows.size, -1)
     around, triangle = neighbours.around(which, named.T[which, column])
     tests = intersect(target, pixels, rows[around], triangle, LATTICE)
-    viewer = target.viewer
-    hit = np.flatnonzero((tests.inside >= 0) & (tests.depth >= viewer.near) & (tests.depth <= viewer.far))
-    order = hit[np.lexsort((tests.triangle[hit], tests.depth[hit], around[hit]))][::-1]
-    result[around[order]] = tests.triangle[order]  # the last write of a row is its nearest
+    depth = plane_depth(target, triangle, pixels.directions()[rows[around]])
+    hit = np.flatnonzero((tests.inside >= 0) & (depth >= target.viewer.near) & (depth <= target.viewer.far))
+    nearest = np.full(rows.size, np.inf)
+    np.minimum.at(nearest, around[hit], depth[hit])
+    first = hit[depth[hit] <= nearest[around[hit]] * (1 + RESOLUTION)]
+    order = first[np.lexsort((tests.triangle[first], around[first]))][::-1]
+    result[around[order]] = tests.triangle[order]  # the last write of a row is its lowest triangle
     return result
