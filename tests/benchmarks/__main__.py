@@ -33,6 +33,12 @@ PARTS = ("duels", "sequences", "facets", "pixels", "triangles")
 @click.option(
     "--against", type=click.Path(exists=True, path_type=Path), help="Earlier results to compare with."
 )
+@click.option(
+    "--clock",
+    type=click.Choice(("wall", "cpu")),
+    default="wall",
+    help="Print wall seconds, or processor time of all processes, which a busy machine changes less.",
+)
 @click.option("--docs", is_flag=True, help="Put tables and pictures into docs.")
 @click.option(
     "--from", "given", type=click.Path(exists=True, path_type=Path), help="Measure nothing, take results."
@@ -44,6 +50,7 @@ def main(
     rounds: int | None,
     kept: Path | None,
     against: Path | None,
+    clock: str,
     docs: bool,
     given: Path | None,
 ) -> None:
@@ -54,9 +61,9 @@ def main(
         kept.parent.mkdir(parents=True, exist_ok=True)
         _measure(results, kept, rounds or (2 if quick else 3), only or PARTS, names, quick=quick)
         click.echo(f"\nkept in {kept}")
-    _tell(results)
+    _tell(results, clock)
     if against:
-        click.echo("\n" + tables.comparison(results, json.loads(against.read_text())))
+        click.echo("\n" + tables.comparison(results, json.loads(against.read_text()), clock))
     if docs:
         click.echo("\n".join(f"wrote {path.relative_to(ROOT)}" for path in page.write_docs(results)))
 
@@ -102,11 +109,11 @@ def _measure(
             keep("triangles")
 
 
-def _tell(results: Mapping[str, Any]) -> None:
+def _tell(results: Mapping[str, Any], clock: str) -> None:
     """Print what was found."""
     made = results.get("curves", {})
     if "duels" in results:
-        click.echo("\n" + tables.time_table(results) + "\n\n" + tables.ratio_table(results))
+        click.echo("\n" + tables.time_table(results, clock) + "\n\n" + tables.ratio_table(results, clock))
     if "sequences" in results:
         click.echo("\n" + tables.sequence_table(results))
     for rows in made.values():

@@ -26,7 +26,8 @@ MODELS = (
     *("spring902", "teapot1024", "knot1200", "sphere1620"),
 )
 QUILT_PIXELS = 48e6
-"""Pixels of the facets' rectangles; packed in rows they take some 55 million of quilt."""
+"""Pixels of the facets' rectangles; packed in rows they take 48 to 80 million of quilt."""
+_KNOT_FILL = 0.63  # of a quilt in rows that the rectangles of the knot's facets take
 _DETAIL = 1  # level of the mesh where triangles do not vary
 
 Row = dict[str, Any]
@@ -52,7 +53,7 @@ def by_facets(rounds: int, names: tuple[str, ...] = MODELS) -> Iterator[Row]:
 def by_pixels(rounds: int, megapixels: tuple[int, ...] = (1, 2, 4, 8, 16, 32, 64)) -> Iterator[Row]:
     """Figure 20: the knot of 1200 facets in quilts of 1 to 64 million pixels."""
     for size in megapixels:
-        place, stage = _stage("knot1200", size * 0.9e6)
+        place, stage = _stage("knot1200", size * _KNOT_FILL * 1e6)
         viewer = viewer_of(place)
         yield _described(stage, viewer, "knot1200") | {"times": _times(stage, viewer, rounds, rivals=False)}
 
@@ -85,14 +86,15 @@ def _described(stage: Stage, viewer: Viewer, name: str) -> Row:
 def _times(stage: Stage, viewer: Viewer, rounds: int, *, rivals: bool) -> Times:
     """Whole frames of ours with two workers; with `rivals` OpenGL's, triangles sorted or not."""
     buffers = (shared_buffers if can_fork() else new_buffers)(stage)
-    dirty = np.ones(stage.facets.count, dtype=np.bool_)
+    frame = binned(stage, viewer).frame
+    dirty = frame.rays.lit.copy()
     contestants: dict[str, Callable[[], object]] = {}
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, [buffers], 2)) if can_fork() else None
         run = pool.draw if pool else None
         contestants["frame 2"] = partial(draw_frame, stage, viewer, buffers, dirty=dirty, run=run)
         if rivals and not opengl.renderer().startswith("-"):
-            quilt = ends.enter_context(opengl.Quilt(stage, binned(stage, viewer).frame, culling=False))
+            quilt = ends.enter_context(opengl.Quilt(stage, frame, culling=False))
             contestants["opengl sorted"] = partial(quilt.draw, "ggx")
             contestants["opengl whole"] = partial(quilt.draw, "ggx", whole_mesh=True)
         return race(contestants, rounds, once=0.6)
@@ -101,6 +103,6 @@ def _times(stage: Stage, viewer: Viewer, rounds: int, *, rivals: bool) -> Times:
 def _stages(stage: Stage, viewer: Viewer) -> dict[str, float]:
     """Seconds by stage in one process, the second frame's: the first finds cold memory."""
     buffers = new_buffers(stage)
-    dirty = np.ones(stage.facets.count, dtype=np.bool_)
+    dirty = binned(stage, viewer).frame.rays.lit.copy()
     draw_frame(stage, viewer, buffers)
     return stage_seconds(lambda: draw_frame(stage, viewer, buffers, dirty=dirty))

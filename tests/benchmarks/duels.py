@@ -8,14 +8,13 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import OpenEXR
 
 from quiltcli import raster
 from quiltcli.draw import Buffers, Stage, draw_frame, new_buffers
 from quiltcli.exr import write_exr
 from quiltcli.pool import Pool, can_fork, shared_buffers
-from quiltcli.raster import Frame, rasterize
+from quiltcli.raster import rasterize
 from quiltcli.unmap import page_of
 from quiltcli.viewer import Viewer
 from tests.benchmarks import meshes, opengl
@@ -77,8 +76,9 @@ def duel(name: str, rounds: int, scratch: Path, *, quick: bool = False) -> dict[
         contestants["embree"] = caster(work.frame.sight, rays)
         if not opengl.renderer().startswith("-"):
             contestants |= _opengl(kinds, viewer, ends)
-        times = race(contestants, rounds)
-        times |= race(_writes(stage, buffers, scratch), 1 if quick else rounds, once=0.5, warm=False)
+        times = race(contestants, rounds, cold=("embree",))
+        writes = _writes(stage, buffers, scratch)
+        times |= race(writes, 1 if quick else rounds, once=1.0, cold=writes)
     if name == "dragon/ball" and not quick and "opengl two-sided draw" in times:
         times |= _whole_mesh(place, stage)
     return {"counts": counts, "times": times}
@@ -98,8 +98,7 @@ def _ours(
     kind: str, stage: Stage, viewer: Viewer, work: Work, buffers: Buffers, ends: ExitStack
 ) -> Contestants:
     """Our own ways: binning, depth keys, hits and whole frames."""
-    dirty = np.ones(stage.facets.count, dtype=np.bool_)
-    frame = partial(draw_frame, stage, viewer, buffers, dirty=dirty)
+    frame = partial(draw_frame, stage, viewer, buffers, dirty=work.frame.rays.lit.copy())
     contestants: dict[str, Callable[[], object]] = {
         f"{kind} bin": lambda: binned(stage, viewer),
         f"{kind} keys": lambda: depth_keys(work),
@@ -126,16 +125,12 @@ def all_hits(work: Work) -> int:
 def _opengl(kinds: Mapping[str, Stage], viewer: Viewer, ends: ExitStack) -> Contestants:
     contestants: dict[str, Callable[[], object]] = {}
     for kind, stage in kinds.items():
-        quilt = ends.enter_context(opengl.Quilt(stage, _frame(stage, viewer), culling=kind == "culled"))
+        quilt = ends.enter_context(opengl.Quilt(stage, binned(stage, viewer).frame, culling=kind == "culled"))
         contestants[f"opengl {kind} draw"] = partial(quilt.draw, "ggx")
         if kind == "two-sided":
             contestants["opengl lambert draw"] = partial(quilt.draw, "lambert")
             contestants["opengl read"] = quilt.read
     return contestants
-
-
-def _frame(stage: Stage, viewer: Viewer) -> Frame:
-    return binned(stage, viewer).frame
 
 
 def _writes(stage: Stage, buffers: Buffers, scratch: Path) -> Contestants:
@@ -152,14 +147,14 @@ def _whole_mesh(place: Place, stage: Stage) -> dict[str, dict[str, list[float]]]
     """The usual way, every triangle to every facet, against ours with the same mesh; one round."""
     stage, viewer = with_mesh(stage, place, meshes.detailed(WHOLE_MESH)), viewer_of(place)
     buffers = (shared_buffers if can_fork() else new_buffers)(stage)
-    dirty = np.ones(stage.facets.count, dtype=np.bool_)
+    frame = binned(stage, viewer).frame
+    dirty = frame.rays.lit.copy()
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, [buffers], 2)) if can_fork() else None
-        quilt = ends.enter_context(opengl.Quilt(stage, _frame(stage, viewer), culling=False))
+        quilt = ends.enter_context(opengl.Quilt(stage, frame, culling=False))
         run = pool.draw if pool else None
-        draw_frame(stage, viewer, buffers, dirty=dirty, run=run)
         contestants: Contestants = {
             "smaller mesh frame 2": lambda: draw_frame(stage, viewer, buffers, dirty=dirty, run=run),
             "smaller mesh opengl whole": lambda: quilt.draw("ggx", whole_mesh=True),
         }
-        return race(contestants, 3, once=1.0, warm=False)
+        return race(contestants, 3, once=1.0, cold=("smaller mesh opengl whole",))

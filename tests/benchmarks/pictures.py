@@ -107,7 +107,7 @@ def _page(title: str, caption: str, parts: Sequence[str], names: Sequence[str]) 
     paper = f'<rect width="{_WIDTH}" height="{_HEIGHT}" rx="6" fill="#fff"/>'
     words = [
         _text(_LEFT, 24, title, 'font-size="15" font-weight="bold"'),
-        _text(_LEFT - 8, 40, "ms", 'text-anchor="end"'),
+        _text(_LEFT - 8, 30, "ms", 'text-anchor="end"'),
     ]
     words.append(_text((_LEFT + _WIDTH - _RIGHT) / 2, _HEIGHT - 10, caption, 'text-anchor="middle"'))
     return "\n".join([head, paper, *words, *parts, *legend, "</svg>"]) + "\n"

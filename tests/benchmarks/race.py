@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from statistics import median
 from typing import Any, TypeAlias
@@ -20,12 +20,19 @@ Times: TypeAlias = dict[str, dict[str, list[float]]]
 """name → {"wall": seconds of each round, "cpu": processor seconds of all processes}."""
 
 
-def race(contestants: Contestants, rounds: int, once: float = 20.0, warm: bool = True) -> Times:
-    """Time every contestant `rounds` times, in turn; what takes longer than `once` seconds runs once."""
+def race(contestants: Contestants, rounds: int, once: float = 20.0, cold: Collection[str] = ()) -> Times:
+    """Time every contestant `rounds` times, in turn, after a first time that does not count.
+
+    Args:
+        contestants: what to time.
+        rounds: how often.
+        once: seconds; what takes longer is timed only once.
+        cold: those that have no use for a first time.
+    """
     times: Times = {name: {"wall": [], "cpu": []} for name in contestants}
-    if warm:
-        for run in contestants.values():
-            run()
+    for name in contestants:
+        if name not in cold:
+            contestants[name]()
     for _ in range(rounds):
         for name, run in contestants.items():
             if times[name]["wall"] and times[name]["wall"][0] > once:

@@ -43,24 +43,24 @@ def target_table(results: Mapping[str, Any]) -> str:
     return table(("what", "where", "found", "target", "met"), rows, 2)
 
 
-def time_table(results: Mapping[str, Any]) -> str:
-    """Milliseconds of every contestant."""
+def time_table(results: Mapping[str, Any], clock: str = "wall") -> str:
+    """Milliseconds of every contestant, `wall` or processor time of all processes (`cpu`)."""
     ours = ("bin", "keys", "hits", "frame 1", "frame 2")
     rows = []
     for name, found in results.get("duels", {}).items():
         times = found["times"]
         for kind in KINDS:
             pixels = f"{found['counts']['lit pixels'] / 1e6:.1f}"
-            cells = [ms(seconds(times, f"{kind} {what}")) for what in ours]
-            cells += [ms(seconds(times, "embree")), ms(seconds(times, f"opengl {kind} draw"))]
-            cells += [ms(seconds(times, who)) for who in ("opengl read", "write zip", "write zstd")]
+            cells = [ms(seconds(times, f"{kind} {what}", clock)) for what in ours]
+            cells += [ms(seconds(times, who, clock)) for who in ("embree", f"opengl {kind} draw")]
+            cells += [ms(seconds(times, who, clock)) for who in ("opengl read", "write zip", "write zstd")]
             rows.append((name, kind, pixels, *cells))
     head = ("scene/display", "", "Mpixel", *ours, "Embree", "GL draws", "GL read", "ZIP", "ZSTD")
     return table(head, rows, 2)
 
 
-def ratio_table(results: Mapping[str, Any]) -> str:
-    """Ours over theirs; below 1 we are faster."""
+def ratio_table(results: Mapping[str, Any], clock: str = "wall") -> str:
+    """Ours over theirs; below 1 we are faster. Of single threads always processor time."""
     rows = []
     for name, found in results.get("duels", {}).items():
         times = found["times"]
@@ -69,11 +69,11 @@ def ratio_table(results: Mapping[str, Any]) -> str:
             values = (
                 ratio(times, keys, "embree", "cpu"),
                 ratio(times, (f"{kind} bin", keys), "embree", "cpu"),
-                ratio(times, frame, "embree"),
-                ratio(times, frame, draw),
-                ratio(times, frame, "opengl lambert draw"),
-                ratio(times, frame, (draw, "opengl read")),
-                ratio(times, frame, "write zip"),
+                ratio(times, frame, "embree", clock),
+                ratio(times, frame, draw, clock),
+                ratio(times, frame, "opengl lambert draw", clock),
+                ratio(times, frame, (draw, "opengl read"), clock),
+                ratio(times, frame, "write zip", clock),
             )
             rows.append((name, kind, *map(share, values)))
     head = ("keys / Embree", "bin + keys / Embree", "frame / Embree", "frame / GL draws")
@@ -135,7 +135,7 @@ def stage_table(rows: Sequence[Mapping[str, Any]]) -> str:
     return table(("display", *STAGES), lines)
 
 
-def comparison(new: Mapping[str, Any], old: Mapping[str, Any]) -> str:
+def comparison(new: Mapping[str, Any], old: Mapping[str, Any], clock: str = "wall") -> str:
     """Our times now over those of an earlier run, as they are and against what Embree took in each."""
     rows = []
     for name in new.get("duels", {}):
@@ -144,9 +144,7 @@ def comparison(new: Mapping[str, Any], old: Mapping[str, Any]) -> str:
         now, then = new["duels"][name]["times"], old["duels"][name]["times"]
         for who in now:
             if who in then:
-                plain = seconds(now, who) / seconds(then, who)
-                scaled = ratio(now, who, "embree") / ratio(then, who, "embree")
-                rows.append(
-                    (name, who, ms(seconds(then, who)), ms(seconds(now, who)), share(plain), share(scaled))
-                )
+                before, after = seconds(then, who, clock), seconds(now, who, clock)
+                scaled = ratio(now, who, "embree", clock) / ratio(then, who, "embree", clock)
+                rows.append((name, who, ms(before), ms(after), share(after / before), share(scaled)))
     return table(("scene/display", "what", "then", "now", "now / then", "against Embree"), rows, 2)
