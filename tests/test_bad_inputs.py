@@ -242,7 +242,7 @@ CASES = [
     Case("layout: missing", [NAMED], [],
          "job.yaml:3:9: layout: no such file: layout.yaml"),
     Case("layout: too small", [swap(JOB, "scene:", "layout: {method: rows, size: [64, 64], max_pages: 1}\nscene:")], [],
-         "display.yaml: 2 facets take 2 pages of 64×64 pixels by the method rows, but at most 1 may be used"),
+         "display.yaml: 2 facets take 2 pages of 64×64 pixels by the method rows, but at most 1 may be used; 4096 pixels of 1 facet find no place; a density of at most 48.4 % of the present one would do, or pages of 130×130 would"),
     Case("layout: too small for one", [swap(JOB, "scene:", "layout: {method: rows, size: [32, 32]}\nscene:")], [],
          "display.yaml: facet 1 (back) is 64×64 pixels, more than a 32×32 page holds turned or not; a page of 64×64 would, or a density of at most 50 % of the present one", "display.yaml: facet 2 (right) is 64×64 pixels, more than a 32×32 page holds turned or not; a page of 64×64 would, or a density of at most 50 % of the present one"),
     Case("scene: missing mesh", [gone(BALL)], [],
