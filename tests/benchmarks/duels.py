@@ -47,6 +47,7 @@ SCENES: Mapping[str, Callable[[], Mesh]] = {
 }
 DISPLAYS: Mapping[str, Callable[[], Place]] = {"cube": cube, "ball": lambda: ball(3)}
 NAMES = ("dragon/ball", "dragon/cube", "room/cube", "room/ball", "mixed/cube", "mixed/ball", "spheres/cube")
+_BRIEF = ("culled hits", "two-sided hits", "culled frame 1", "two-sided frame 1", "opengl lambert draw")
 QUICK = ("dragon/ball", "room/cube")
 
 
@@ -63,20 +64,19 @@ def duel(name: str, rounds: int, scratch: Path, *, quick: bool = False) -> dict[
     stage = with_mesh(stage, place, SCENES[scene]())
     viewer = viewer_of(place)
     kinds = {"culled": culled(stage), "two-sided": stage}
-    counts = {}
+    works = {kind: binned(made, viewer) for kind, made in kinds.items()}
+    buffers = (shared_buffers if can_fork() else new_buffers)(stage)
+    rays = list(pixel_rays(stage, works["two-sided"].frame))
+    counts: dict[str, Any] = {"lit pixels": sum(map(len, rays))}
     with ExitStack() as ends:
         contestants: dict[str, Callable[[], object]] = {}
-        for kind, made in kinds.items():
-            work = binned(made, viewer)
-            buffers = (shared_buffers if can_fork() else new_buffers)(made)
-            counts[kind] = _counts(made, viewer, work, buffers)
-            contestants |= _ours(kind, made, viewer, work, buffers, ends)
-        rays = list(pixel_rays(stage, work.frame))
-        counts["lit pixels"] = sum(map(len, rays))
-        contestants["embree"] = caster(work.frame.sight, rays)
+        for kind, work in works.items():
+            counts[kind] = _counts(kinds[kind], viewer, work, buffers)
+            contestants |= _ours(kind, kinds[kind], viewer, work, buffers, ends)
+        contestants["embree"] = caster(works["two-sided"].frame.sight, rays)
         if not opengl.renderer().startswith("-"):
             contestants |= _opengl(kinds, viewer, ends)
-        times = race(contestants, rounds, cold=("embree",))
+        times = race(contestants, rounds, cold=("embree",), brief=_BRIEF)
         writes = _writes(stage, buffers, scratch)
         times |= race(writes, 1 if quick else rounds, once=1.0, cold=writes)
     if name == "dragon/ball" and not quick and "opengl two-sided draw" in times:

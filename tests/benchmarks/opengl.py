@@ -78,7 +78,8 @@ def _context() -> Any:
     os.environ.setdefault("LIBGL_ALWAYS_SOFTWARE", "1")
     import moderngl
 
-    return moderngl.create_standalone_context(backend="egl")
+    how: dict[str, Any] = {"backend": "egl"}
+    return moderngl.create_standalone_context(**how)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,14 @@ Times: TypeAlias = dict[str, dict[str, list[float]]]
 """name → {"wall": seconds of each round, "cpu": processor seconds of all processes}."""
 
 
-def race(contestants: Contestants, rounds: int, once: float = 20.0, cold: Collection[str] = ()) -> Times:
+def race(
+    contestants: Contestants,
+    rounds: int,
+    *,
+    once: float = 20.0,
+    cold: Collection[str] = (),
+    brief: Collection[str] = (),
+) -> Times:
     """Time every contestant `rounds` times, in turn, after a first time that does not count.
 
     Args:
@@ -28,14 +35,16 @@ def race(contestants: Contestants, rounds: int, once: float = 20.0, cold: Collec
         rounds: how often.
         once: seconds; what takes longer is timed only once.
         cold: those that have no use for a first time.
+        brief: those that are timed once, as what they tell is beside the point.
     """
     times: Times = {name: {"wall": [], "cpu": []} for name in contestants}
     for name in contestants:
-        if name not in cold:
+        if name not in cold and name not in brief:
             contestants[name]()
     for _ in range(rounds):
         for name, run in contestants.items():
-            if times[name]["wall"] and times[name]["wall"][0] > once:
+            before = times[name]["wall"]
+            if before and (name in brief or before[0] > once):
                 continue
             wall, cpu = time.perf_counter(), processor_seconds()
             run()

@@ -10,7 +10,7 @@ import numpy as np
 
 from quiltcli.display import Facets, load_display
 from quiltcli.draw import Buffers, Stage, draw_frame, stage_of
-from quiltcli.geometry import FloatArray, Int32Array, IntArray
+from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.job import JobFile, ResolutionSpec, load_display_file
 from quiltcli.layout import align
 from quiltcli.packing import pack
@@ -129,7 +129,7 @@ def lit_pixels(stage: Stage, frame: Frame) -> IntArray:
     return np.flatnonzero(lit[np.maximum(stage.owners, 0)])
 
 
-def pixel_rays(stage: Stage, frame: Frame, step: int = 1 << 20) -> Iterator[FloatArray]:
+def pixel_rays(stage: Stage, frame: Frame, step: int = 1 << 20) -> Iterator[Float32Array]:
     """Directions (n, 3) float32 from the eye through the centres of `lit_pixels`, `step` at a time."""
     layout, pixels = stage.layout, lit_pixels(stage, frame)
     matrices = frame.rays.eye_from_quilt.astype(np.float32)

@@ -7,7 +7,7 @@ its row.
 from __future__ import annotations
 
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from types import GeneratorType
@@ -46,7 +46,7 @@ class Stopwatch:
     """Seconds by stage; a stage's time does not include the stages it calls."""
 
     def __init__(self) -> None:
-        self.seconds: Counter[str] = Counter()
+        self.seconds: dict[str, float] = defaultdict(float)
         self._running = ["rest"]
         self._since = time.perf_counter()
 
