@@ -193,6 +193,6 @@ def test_the_command_packs_canvases_aspects_and_around_pins(tmp_path):
     assert run(cube, "-o", first, "--size", "uhd") == ["fill 72.2 %", "pages 2 of 3840×2160 pixels"]
     assert run(cube, "-o", second, "--pins", first) == ["fill 72.2 %", "pages 2 of 3840×2160 pixels"]
     lines = run(cube, "-o", second, "--aspect", "16:9", "--method", "rects", "--picture", tmp_path / "p.svg")
-    assert lines == ["fill 67.6 %", "pages 1 of 5616×3160 pixels"]
+    assert lines == ["fill 74.6 %", "pages 1 of 5344×3006 pixels"]
     # The display beside the pages: its five facets once more.
     assert (tmp_path / "p.svg").read_text().count("<polygon") > 5 + 5 + 5

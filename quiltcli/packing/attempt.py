@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from quiltcli.packing.model import PackInput, PackResult
 
-SLOW = 5.0
+SLOW = 6.0
 """Estimates are for a computer this much slower than the one they were measured on."""
 
 

@@ -31,11 +31,13 @@ class Mosaic:
         shapes: what to place.
         cell: side of a cell, pixels.
         steps: changes to try; 0 takes the mosaic as the order by area has it.
+        band: rows of cells above the lowest taken one that are looked at; 0 looks at all.
     """
 
     shapes: Shapes
     cell: int
     steps: int
+    band: int = 0
     _cells: list[list[Cells]] = field(default_factory=list)
 
     def run(self, wanted: PackInput) -> PackResult:
@@ -44,12 +46,12 @@ class Mosaic:
             self._cells.extend(cells_of(wanted, self.shapes, self.cell))
         order = np.lexsort((np.arange(self.shapes.area.size), -self.shapes.area)).tolist()
         locks = [-1] * len(order)
-        best = pack_mosaic(wanted, self._cells, self.cell, order, locks)
+        best = pack_mosaic(wanted, self._cells, self.cell, order, locks, self.band)
         least = _cost(wanted, best)
         dice = Dice()
         for _ in range(self.steps):
             new_order, new_locks = self._changed(order, locks, dice)
-            result = pack_mosaic(wanted, self._cells, self.cell, new_order, new_locks)
+            result = pack_mosaic(wanted, self._cells, self.cell, new_order, new_locks, self.band)
             cost = _cost(wanted, result)
             if cost <= least:
                 best, least, order, locks = result, cost, new_order, new_locks

@@ -16,10 +16,10 @@ _SPARSE = 0.7  # of its rectangles a display must fill for rectangles to have a 
 
 def auto_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     """All that `rects` and `nest` do, in turn; rectangles only for facets that nearly fill theirs."""
-    nest = nest_attempts(wanted, seconds / 2)
     rects = rects_attempts(wanted, seconds / 2)
+    nest = nest_attempts(wanted, seconds / 2)
     if nest[0].area <= _SPARSE * rects[0].area:
-        return nest
+        return nest_attempts(wanted, seconds)
     return [attempt for both in zip_longest(rects, nest) for attempt in both if attempt is not None]
 
 

@@ -73,9 +73,10 @@ def _runs(y: np.ndarray, left: Int32Array, right: Int32Array, cell: int) -> Runs
 
 
 class _Page:
-    """The cells of one page."""
+    """The cells of one page, from row `_base` on; rows above it are done with."""
 
-    def __init__(self, size: tuple[int, int], cell: int, taken: int = 0) -> None:
+    def __init__(self, size: tuple[int, int], cell: int, taken: int = 0, band: int = 0) -> None:
+        self._base, self._band = 0, band
         self._width, self._height = size
         self._cell = cell
         self._stride = -(-size[0] // cell)
@@ -88,7 +89,7 @@ class _Page:
     @property
     def empty(self) -> bool:
         """Whether nothing is on it."""
-        return self._taken == 0
+        return self._taken == 0 and self._base == 0
 
     def spot(self, cells: Cells) -> tuple[int, int] | None:
         """Row and column of the highest, then leftmost cell where a shape fits; None without room."""
@@ -105,6 +106,7 @@ class _Page:
             blocked |= reach >> (row * self._stride + low)
         free = ~blocked & (blocked + 1)  # the lowest bit that is not set
         y, x = divmod(free.bit_length() - 1, self._stride)
+        y += self._base
         return (y, x) if y <= lowest else None
 
     def _reach(self, length: int) -> int:
@@ -118,11 +120,15 @@ class _Page:
 
     def take(self, cells: Cells, y: int, x: int) -> None:
         """Mark the cells of a placed shape and of its padding."""
-        taken = self._taken
+        taken, top = self._taken, y - self._base
         for row, low, high in cells.kept:
             low, high = max(x + low, 0), min(x + high, self._stride)
-            if y + row >= 0 and high > low:
-                taken |= ((1 << (high - low)) - 1) << ((y + row) * self._stride + low)
+            if top + row >= 0 and high > low:
+                taken |= ((1 << (high - low)) - 1) << ((top + row) * self._stride + low)
+        done = taken.bit_length() // self._stride - self._band if self._band else 0
+        if done > 0:
+            self._base += done
+            taken >>= done * self._stride
         self._set(taken)
 
 
@@ -138,12 +144,18 @@ def _repeated(bits: int, stride: int, rows: int) -> int:
 
 
 def pack_mosaic(
-    wanted: PackInput, cells: list[list[Cells]], cell: int, order: Sequence[int], locks: Sequence[int]
+    wanted: PackInput,
+    cells: list[list[Cells]],
+    cell: int,
+    order: Sequence[int],
+    locks: Sequence[int],
+    band: int = 0,
 ) -> PackResult:
     """Place shapes in this order, each on the first page that has room for it.
 
     Of a shape's orientations the one that ends highest is taken, then the leftmost, then the first.
     A lock is the only orientation a shape may have, −1 for any; one that fits no page is ignored.
+    With a band, only so many rows of cells above the lowest taken one are looked at, which is quicker.
     """
     count = len(order)
     page, where = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
@@ -153,7 +165,7 @@ def pack_mosaic(
         at, best = 0, None
         while best is None:
             if at == len(pages):
-                pages.append(_Page(wanted.page, cell))
+                pages.append(_Page(wanted.page, cell, band=band))
             best = _best(pages[at], cells[shape], cell, locks[shape])
             fresh = at >= wanted.begun and pages[at].empty
             best = _best(pages[at], cells[shape], cell, -1) if best is None and fresh else best

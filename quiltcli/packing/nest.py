@@ -13,10 +13,13 @@ from quiltcli.packing.shelves import ShelfRule, pack_shelves
 
 _RULES = (
     ShelfRule(window=12, slack=10, levels=4),
-    ShelfRule(window=40, slack=10, levels=4),
+    ShelfRule(window=40, slack=10, levels=4, reach=12),
+    ShelfRule(window=40, slack=20, levels=8, reach=12),
     ShelfRule(window=12, slack=3, levels=2),
     ShelfRule(window=1, slack=3, levels=2),
-    ShelfRule(window=100, slack=20, levels=8),
+    ShelfRule(window=100, slack=20, levels=8, reach=10),
+    ShelfRule(window=40, slack=15, levels=6, reach=12),
+    ShelfRule(window=100, slack=15, levels=6, reach=10),
 )
 FEW = 120
 """Facets up to which a mosaic pays."""
@@ -45,7 +48,9 @@ def shape_attempts(wanted: PackInput, shapes: Shapes, seconds: float) -> list[At
         for rule in _RULES
     ]
     if len(wanted.size) > FEW:
-        return shelves
+        large = _large_mosaic(wanted, shapes, area)
+        # It takes long, and is worth it only while there is time for much else.
+        return [shelves[0], large, *shelves[1:]] if large.seconds < seconds / 2 else shelves
     return [*shelves, *_mosaics(wanted, shapes, area, seconds)]
 
 
@@ -74,6 +79,17 @@ def _mosaics(wanted: PackInput, shapes: Shapes, area: float, seconds: float) -> 
         Attempt(first.run, once, area, "mosaic", narrowest),
         Attempt(better.run, (steps + 1) * once, area, "mosaic", narrowest),
     ]
+
+
+def _large_mosaic(wanted: PackInput, shapes: Shapes, area: float) -> Attempt:
+    """A mosaic that looks at a band of the page only; it pays for many shapes that are all different."""
+    heights = shapes.size[:, :, 1]
+    cell = _cell(float(heights.mean()) / 25, wanted.align)
+    band = math.ceil(2 * float(heights.min(axis=1).max()) / cell)
+    rows = float(heights.sum()) / cell
+    bits = math.sqrt(area) / cell * 1.5 * band
+    once = SLOW * (5.5e-4 * len(wanted.size) + rows * (1.5e-6 + 2e-6 * bits / 65536))
+    return Attempt(Mosaic(shapes, cell, 0, band).run, once, area, "shelves", least_width(wanted))
 
 
 def _cell(pixels: float, align: int) -> int:

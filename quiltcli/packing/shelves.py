@@ -209,5 +209,6 @@ class _Row:
         reach = x + right + self._padding
         for shift in range(-self._padding, self._padding + 1):
             low, high = max(y + shift, 0), min(y + shift + right.size, self._height)
-            rows = reach[low - y - shift : high - y - shift]
-            np.maximum(self._front[low:high], rows, out=self._front[low:high])
+            if low < high:
+                rows = reach[low - y - shift : high - y - shift]
+                np.maximum(self._front[low:high], rows, out=self._front[low:high])
