@@ -227,7 +227,7 @@ def test_command_writes_pictures_and_figures(tmp_path):
     labels = [line[:24].strip() for line in result.stdout.splitlines()]
     assert labels[:9] == [
         *("picture", "images", "direct picture", "heat map", "view on lit facets"),
-        *("error, mean", "error, 99 %", "error, max", "PSNR"),
+        *("error, mean", "error, 99 %", "error, max", "resampled once, mean"),
     ]
 
 

@@ -20,6 +20,13 @@ from quiltcli.cli.printing import print_aligned
 @click.option("--size", type=SIZE, default="1200x900", show_default=True, help="Size of the picture.")
 @click.option("--from", "place", type=POINT, metavar="X,Y,Z", help="Look from here; from the eye by default.")
 @click.option("--look-at", type=POINT, metavar="X,Y,Z", help="Look there; at the display by default.")
+@click.option("--third-person", is_flag=True, help="Show the viewer too, with rays to the display's outline.")
+@click.option(
+    "--scene",
+    type=click.Choice(("ghost", "solid", "none")),
+    default="ghost",
+    help="As a third person sees it.",
+)
 @click.option("--fov", type=click.FloatRange(0, 170, min_open=True), help="Degrees from top to bottom.")
 @click.option("--filter", type=click.Choice(("nearest", "linear")), default="linear", show_default=True)
 @click.option(
@@ -57,7 +64,8 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
         how["compare"] = any((pictures.picture, pictures.direct, pictures.heat_map))
     if how["size"] is None:
         raise click.UsageError("--size: a picture needs a width and a height")
-    options = PictureOptions(samples=how.pop("supersample"), threads=how.pop("threads") or 0, **how)
+    samples, threads = how.pop("supersample"), how.pop("threads") or 0
+    options = PictureOptions(samples=samples, threads=threads, resampled=True, **how)
     loaded = load_job(job, sets)
     for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures):
         click.echo(line)

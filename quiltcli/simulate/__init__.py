@@ -23,6 +23,8 @@ from quiltcli.simulate.compare import Comparison, compare, figures, heat_map, he
 from quiltcli.simulate.images import shown_images
 from quiltcli.simulate.lookup import Shown
 from quiltcli.simulate.picture import direct_light, displayed_light, outlined, visible_facets, with_channels
+from quiltcli.simulate.reference import resampled_light
+from quiltcli.simulate.thirdperson import third_person_camera, third_person_light
 from quiltcli.viewer import Viewer, check_viewer, viewer_at
 
 __all__ = [
@@ -49,6 +51,9 @@ class PictureOptions:
         filter: `nearest` shows the pixel that is met, `linear` goes between the four around.
         samples: rays a pixel, across and down.
         compare: hold the picture against a direct one of the scene; from the eye only.
+        resampled: say too what resampling alone costs, which takes some more direct pictures.
+        third_person: show the viewer too, who looks at the display; there is nothing to compare then.
+        scene: how a third person sees the scene, a name of `thirdperson.SCENES`.
         edges: draw a line along the edges of the facets; what is compared is the picture without.
         threads: batches drawn at a time; 0 takes every core.
     """
@@ -60,6 +65,9 @@ class PictureOptions:
     filter: str = "linear"
     samples: int = 2
     compare: bool = True
+    resampled: bool = False
+    third_person: bool = False
+    scene: str = "ghost"
     edges: bool = False
     threads: int = 0
 
@@ -106,6 +114,8 @@ def simulate(
 
 def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:
     """One picture of a display with its images on, with its figures where it is taken from the eye."""
+    if options.third_person:
+        return _third_person(stage, viewer, shown, options)
     camera, fov = _camera(viewer, stage.facets, options)
     width, height = (options.samples * side for side in options.size)
     through = camera_display(camera, width, height, fov)
@@ -120,8 +130,31 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     direct = block_means(_image(direct_light(stage, viewer, through, threads), width), options.samples)
     on_lit = np.where(lit, facet, -1).reshape(height, width).astype(np.int32)
     covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
-    comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples))
+    coarse = None
+    if options.resampled:
+        coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads)
+    once = None if coarse is None else block_means(_image(coarse, width), options.samples)
+    comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples), once)
     return Simulation(viewer.frame, picture, direct, comparison, "")
+
+
+def _third_person(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:
+    """A picture of the viewer before the display."""
+    place, look_at = (
+        None if point is None else np.asarray(point, dtype=np.float64)
+        for point in (options.place, options.look_at)
+    )
+    aspect = options.size[0] / options.size[1]
+    camera, fov = third_person_camera(viewer, stage.facets, place, look_at, aspect)
+    width, height = (options.samples * side for side in options.size)
+    through = camera_display(camera, width, height, options.fov or fov)
+    threads = options.threads or default_threads()
+    light, facet = third_person_light(
+        stage, viewer, shown, camera, through, options.filter, options.scene, threads
+    )
+    if options.edges:
+        light = outlined(light, facet, width)
+    return Simulation(viewer.frame, block_means(_image(light, width), options.samples), None, None, "")
 
 
 def _image(light: Float32Array, width: int) -> Float32Array:

@@ -37,6 +37,8 @@ class Comparison:
         seams: error for the picture's contrast within a pixel of where two lit facets meet, over that of
             the pixels beside: 1 where seams do not show; not a number without seams or contrast.
         error: (H, W) errors, 0 where nothing is compared.
+        resampled: mean error of direct pictures as dense as the display, resampled once; not a number
+            where there is none.
     """
 
     share: float
@@ -47,9 +49,16 @@ class Comparison:
     flip: float
     seams: float
     error: Float32Array
+    resampled: float = math.nan
 
 
-def compare(shown: Float32Array, direct: Float32Array, covered: BoolArray, seam: BoolArray) -> Comparison:
+def compare(
+    shown: Float32Array,
+    direct: Float32Array,
+    covered: BoolArray,
+    seam: BoolArray,
+    resampled: Float32Array | None = None,
+) -> Comparison:
     """Compare what the display shows with a direct picture.
 
     Args:
@@ -57,6 +66,7 @@ def compare(shown: Float32Array, direct: Float32Array, covered: BoolArray, seam:
         direct: (H, W, 3) linear light through the same camera.
         covered: (H, W) pixels to compare.
         seam: (H, W) those of them where facets meet.
+        resampled: (H, W, 3) what resampling alone makes of a direct picture, if known.
     """
     both = [np.where(covered[..., None], image, np.float32(0)) for image in (shown, direct)]
     difference = np.abs(both[0].astype(np.float64) - both[1])
@@ -75,7 +85,12 @@ def compare(shown: Float32Array, direct: Float32Array, covered: BoolArray, seam:
         flip=float(flip_map(both[1], both[0])[covered].mean()),
         seams=_seam_ratio(error, direct, covered & seam, covered & _beside(seam)),
         error=error.astype(np.float32),
+        resampled=math.nan if resampled is None else _mean_error(resampled, direct, covered),
     )
+
+
+def _mean_error(image: Float32Array, direct: Float32Array, covered: BoolArray) -> float:
+    return float(np.abs(image[covered].astype(np.float64) - direct[covered]).max(axis=-1).mean())
 
 
 def _beside(seam: BoolArray) -> BoolArray:
@@ -145,12 +160,20 @@ def figures(comparison: Comparison) -> list[tuple[str, str]]:
         ("error, mean", f"{comparison.mean:.3e}"),
         ("error, 99 %", f"{comparison.percentile_99:.3e}"),
         ("error, max", f"{comparison.maximum:.3e}"),
+        *_resampling(comparison),
         ("PSNR", f"{comparison.psnr:.2f} dB"),
         ("FLIP", f"{comparison.flip:.5f}"),
     ]
     if not math.isnan(comparison.seams):
         rows.append(("error at seams", f"{comparison.seams:.2f} × that beside them, for the same contrast"))
     return rows
+
+
+def _resampling(comparison: Comparison) -> list[tuple[str, str]]:
+    if math.isnan(comparison.resampled):
+        return []
+    words = f"{comparison.resampled:.3e}, of direct pictures as dense as the display"
+    return [("resampled once, mean", words)]
 
 
 def heat_scale(error: Float32Array) -> float:

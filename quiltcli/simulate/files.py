@@ -84,7 +84,9 @@ def _check(frames: Sequence[int], options: PictureOptions, pictures: Pictures) -
         if len(frames) > 1 and not _NUMBER.search(path.name):
             wrong = f"is one name for {len(frames)} frames (put #### where the frame number goes)"
             raise OutputError(Problem(wrong, file=str(path)))
-    if names != [pictures.picture] * len(names) and (options.place is not None or not options.compare):
+    if names != [pictures.picture] * len(names) and (
+        options.place is not None or options.third_person or not options.compare
+    ):
         raise JobError("--direct and --heat-map need a comparison, which there is only from the viewer's eye")
 
 

@@ -30,19 +30,31 @@ def with_channels(job: JobFile, channels: tuple[str, ...]) -> JobFile:
     return job.model_copy(update={"output": job.output.model_copy(update={"channels": channels})})
 
 
+def exact(job: JobFile, **render: object) -> JobFile:
+    """The job by the method that is exact, and with other keys of `render`."""
+    update = {"method": "homography", "depth_bits": None, **render}
+    return job.model_copy(update={"render": job.render.model_copy(update=update)})
+
+
 def visible_facets(stage: Stage, camera: Viewer, through: Camera, threads: int) -> Int32Array:
     """The facet (P,) that every ray of the picture meets first, from either side; −1 for none."""
     triangles, facet = triangulate(stage.facets)
-    scene = mesh_scene(stage.facets.corners, triangles)
+    met, _ = first_triangles(stage, camera, through, mesh_scene(stage.facets.corners, triangles), threads)
+    result: Int32Array = np.concatenate((facet, [-1])).astype(np.int32)[met]
+    return result
+
+
+def first_triangles(
+    stage: Stage, camera: Viewer, through: Camera, scene: Scene, threads: int
+) -> tuple[Int32Array, Float32Array]:
+    """The triangle of a scene (P,) that every ray meets first, from either side, −1 for none; how far."""
     # Everything from a micrometre on: the viewer's near and far are for the scene, not for the display.
     here = replace(camera, near=1e-6, far=1e6, depth="radial")
-    job = with_channels(stage.job, ("triangle",))
-    render = job.render.model_copy(update={"samples": 1, "backface_culling": False})
-    display = camera_stage(job.model_copy(update={"render": render}), through, scene)
-    buffers = new_buffers(display)
-    draw_frame(display, here, buffers, threads)
-    result: Int32Array = np.concatenate(([-1], facet)).astype(np.int32)[buffers["triangle"]]
-    return result
+    job = exact(with_channels(stage.job, ("triangle", "Z")), samples=1, backface_culling=False)
+    bare = camera_stage(job, through, scene)
+    buffers = new_buffers(bare)
+    draw_frame(bare, here, buffers, threads)
+    return buffers["triangle"].astype(np.int32) - 1, buffers["Z"]
 
 
 def camera_stage(job: JobFile, through: Camera, scene: Scene) -> Stage:
@@ -106,8 +118,8 @@ def picture_rays(camera: Viewer, through: Camera, pixel: IntArray) -> FloatArray
 
 
 def direct_light(stage: Stage, viewer: Viewer, through: Camera, threads: int) -> Float32Array:
-    """The scene without a display (3, P), through the same camera and by the same renderer."""
-    direct = camera_stage(stage.job, through, stage.scene)
+    """The scene without a display (3, P), through the same camera and by the same renderer, exactly."""
+    direct = camera_stage(exact(stage.job), through, stage.scene)
     buffers = new_buffers(direct)
     draw_frame(direct, viewer, buffers, threads)
     return np.stack([buffers[name].astype(np.float32) for name in "RGB"])
