@@ -31,3 +31,15 @@ def test_a_job_may_take_the_layout_from_texture_coordinates():
     facets, layout = layout_for(UvLayoutSpec(from_uv=True, size=(16, 12)), replace(TWO, uv=uv))
     assert layout.quilt_from_facet[0].tolist() == [[1, 0, 8], [0, -1, 6]]
     assert facets.size.tolist() == [[4, 3], [4, 3]]
+
+
+def test_a_job_may_say_all_that_the_command_takes(tmp_path):
+    write_layout(pack(TWO, "rows", (16, 12)), tmp_path / "pins.yaml")
+    both = replace(TWO, enabled=np.ones(2, dtype=np.bool_))
+    spec = PackSpec(method="nest", pins=tmp_path / "pins.yaml", align=4, padding=1, seconds=0.1)
+    _, layout = layout_for(spec, both)
+    assert layout.pages.tolist() == [[16, 12]]
+    assert layout.quilt_from_facet.tolist() == [[[1, 0, 0], [0, 1, 0]], [[1, 0, 0], [0, 1, 4]]]
+    assert layout_for(PackSpec(aspect=4.0, seconds=0.1), both)[1].pages.tolist() == [[16, 4]]
+    assert layout_for(PackSpec(size=(16, 12), page_facets=1), both)[1].page.tolist() == [0, 1]
+    assert layout_for(PackSpec(size=(16, 12), page_pixels=12), both)[1].page.tolist() == [0, 1]
