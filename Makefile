@@ -46,6 +46,7 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) simulate scenes/demo.yaml -f 6 -o $(DOCS)/box_aside.png --size 960x720 --supersample 3 --from=-0.35,0.55,1.05 --edges
 	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(DOCS)/sphere_eye.png --size 960x720 --supersample 3
 	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(DOCS)/sphere_aside.png --size 960x720 --supersample 3 --from 0.9,0.6,1.0 --edges
+	$(QUILT) simulate scenes/demo.yaml -f 4 -o $(DOCS)/box_third.png --size 960x600 --supersample 3 --third-person
 	$(QUILT) render scenes/demo.yaml -f 6 --overwrite
 	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(DOCS)/box_quilt.png
 	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png
@@ -54,7 +55,7 @@ test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2
 
 test-long: env ## the tests that take minutes
-	$(PY) -m pytest -m long || test $$? -eq 5
+	$(PY) -m pytest -n 2 -m long
 
 lint: env ## ruff: mistakes and layout of the code
 	$(PY) -m ruff check .
