@@ -34,7 +34,7 @@ DEPTH_BITS = ("16", "24", "32f")
 CHANNELS = ("rgba", "Z", "zv", "facet", "object", "triangle", "N", "P")
 COMPRESSIONS = (
     *("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256"),  # lossless
-    *("pxr24", "b44", "b44a", "dwaa", "dwab"),  # lossy
+    *("pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k"),  # lossy
 )
 UNLIT = ("write", "link", "skip")
 DATA_WINDOWS = ("full", "tight")
