@@ -18,7 +18,7 @@ from quiltcli.pool import Pool, can_fork, shared_buffers
 from quiltcli.viewer import Viewer
 from tests.benchmarks import meshes, opengl
 from tests.benchmarks.race import Times, race
-from tests.benchmarks.stages import Place, binned, model, stage_for, viewer_of, with_mesh
+from tests.benchmarks.stages import Place, all_hits, binned, model, stage_for, viewer_of, with_mesh
 from tests.benchmarks.watching import stage_seconds
 
 MODELS = (
@@ -78,6 +78,7 @@ def _described(stage: Stage, viewer: Viewer, name: str) -> Row:
         "facets": stage.facets.count,
         "lit": int(np.count_nonzero(work.frame.rays.lit)),
         "quilt pixels": int(stage.owners.size),
+        "visible pixels": all_hits(work),
         "triangles": len(stage.scene.triangles),
         "block pairs": int(work.frame.pairs.triangle.size),
     }

@@ -14,7 +14,6 @@ from quiltcli import raster
 from quiltcli.draw import Buffers, Stage, draw_frame, new_buffers
 from quiltcli.exr import write_exr
 from quiltcli.pool import Pool, can_fork, shared_buffers
-from quiltcli.raster import rasterize
 from quiltcli.unmap import page_of
 from quiltcli.viewer import Viewer
 from tests.benchmarks import meshes, opengl
@@ -24,6 +23,7 @@ from tests.benchmarks.race import Contestants, race
 from tests.benchmarks.stages import (
     Place,
     Work,
+    all_hits,
     ball,
     binned,
     cube,
@@ -115,11 +115,6 @@ def depth_keys(work: Work) -> None:
     """Visibility alone: rasterize every batch up to its depth keys, and read nothing from them."""
     with replaced(raster, "read_canvas", lambda *_: iter(())):
         all_hits(work)
-
-
-def all_hits(work: Work) -> int:
-    """Rasterize every batch; the number of pixels that see the scene."""
-    return sum(hits.pixel.size for batch in work.batches for hits in rasterize(work.frame, batch))
 
 
 def _opengl(kinds: Mapping[str, Stage], viewer: Viewer, ends: ExitStack) -> Contestants:

@@ -14,7 +14,7 @@ from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.job import JobFile, ResolutionSpec, load_display_file
 from quiltcli.layout import align
 from quiltcli.packing import pack
-from quiltcli.raster import Frame
+from quiltcli.raster import Frame, rasterize
 from quiltcli.viewer import Viewer
 from tests.benchmarks.meshes import Mesh, scene_of
 from tests.rig import CUBE, CUBE_FACES, display, icosphere, viewer
@@ -114,6 +114,11 @@ def binned(stage: Stage, seen_by: Viewer) -> Work:
     nothing_to_clear = np.zeros(stage.facets.count, dtype=np.bool_)
     draw_frame(stage, seen_by, {}, dirty=nothing_to_clear, run=keep)
     return found[0]
+
+
+def all_hits(work: Work) -> int:
+    """Rasterize every batch; the number of pixels that see the scene."""
+    return sum(hits.pixel.size for batch in work.batches for hits in rasterize(work.frame, batch))
 
 
 def facet_pairs(frame: Frame) -> tuple[Int32Array, IntArray]:
