@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from quiltcli.display import lit_facets
 from quiltcli.draw import Stage, set_stage
 from quiltcli.errors import OutputError, Problem
 from quiltcli.exr import facet_path, is_complete, numbers_in_name, quilt_path, read_header
@@ -87,7 +88,9 @@ def images_sha(folder: Folder, frame: int) -> str:
     """
     layout = folder.stage.layout
     pages = [quilt_path(folder.path, page + 1, frame) for page in range(len(layout.pages))]
-    facets = [facet_path(folder.path, facet, frame) for facet in layout.facet[layout.page >= 0].tolist()]
+    eye = viewer_at(folder.stage.job.viewer, frame).eye
+    lit = lit_facets(folder.stage.facets, eye) & (layout.page >= 0)  # a render may leave the others out
+    facets = [facet_path(folder.path, facet, frame) for facet in layout.facet[lit].tolist()]
     found = [paths for paths in (pages, facets) if paths and paths[0].is_file()]
     if not found:
         wrong = f"has no images of frame {frame} (it has {format_frames(folder.frames)})"
