@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from tests.benchmarks import curves, duels, meshes, opengl, page, sequence, tables
-from tests.benchmarks.race import canary
+from tests.benchmarks.race import canary, crowding
 
 ROOT = Path(__file__).parents[2]
 PARTS = ("duels", "sequences", "facets", "pixels", "triangles")
@@ -133,6 +133,7 @@ def _machine() -> dict[str, str]:
         "OpenGL": f"left out: {renderer[1:]}" if renderer.startswith("-") else renderer,
         "detailed mesh": f"{len(meshes.detailed(3).triangles):,} triangles ({meshes.detailed(3).name})",
         "65,536 additions": f"{canary():.1f} µs",
+        "two processes beside each other": f"{crowding():.2f} times as long as one",
     }
     if not meshes.has_dragon():
         found["note"] = f"no dragon in the folder ${meshes.DATA} names: a rough ball stands in"

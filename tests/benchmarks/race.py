@@ -7,6 +7,8 @@ what is reported are medians, and ratios are taken inside a round before their m
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
@@ -98,6 +100,18 @@ def _scheduled(pid: int) -> float:
         except (OSError, IndexError):
             continue
     return total * 1e-9
+
+
+def crowding() -> float:
+    """How much longer two processes take side by side than one alone: 1 where two cores are free."""
+    loop = "import time\nt = time.perf_counter()\nfor _ in range(10**7): pass\nprint(time.perf_counter() - t)"
+
+    def longest(count: int) -> float:
+        command = [sys.executable, "-c", loop]
+        runs = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(count)]
+        return max(float(run.communicate()[0]) for run in runs)
+
+    return longest(2) / longest(1)
 
 
 def canary() -> float:
