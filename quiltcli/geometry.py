@@ -45,13 +45,6 @@ def normalized(v: FloatArray) -> FloatArray:
     return result
 
 
-def polygon_normal(corners: FloatArray) -> FloatArray:
-    """Newell's normal of a polygon (n, 3); its length is twice the polygon's area."""
-    local = corners - corners[0]
-    normal: FloatArray = cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
-    return normal
-
-
 def rotation_deg(angles: Sequence[float]) -> FloatArray:
     """Rotation matrix (3, 3) that turns about X, then Y, then Z, by `angles` in degrees."""
     turns = []

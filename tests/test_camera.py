@@ -7,8 +7,9 @@ import pytest
 
 from quiltcli.camera import aimed, camera_display, frame_display
 from quiltcli.display import lit_facets
+from quiltcli.display.polygon import area_vectors
 from quiltcli.errors import ViewerError
-from quiltcli.geometry import polygon_normal
+from quiltcli.geometry import normalized
 from quiltcli.homography import eye_from_quilt
 from quiltcli.layout import check_layout, pixel_owners
 from quiltcli.viewer import Viewer
@@ -33,7 +34,7 @@ def test_it_is_lit_for_its_eye_and_wound_towards_it():
     camera = aimed(viewer(), look)
     facets, layout = camera_display(camera, 30, 20, 50)
     assert lit_facets(facets, camera.eye).all()
-    assert np.allclose(polygon_normal(facets.corners) / np.linalg.norm(polygon_normal(facets.corners)), -look)
+    assert np.allclose(normalized(area_vectors(facets.corners, facets.corner_start)), -look)
     check_layout(layout)
     assert (pixel_owners(layout) == 1).all()
 

@@ -9,17 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from ballstage import ball_scene, stage_of_facets
 from benchmarks.watching import STAGES, counted, stage_seconds
 from rig import display, icosphere, viewer
-from wallscene import lights, wall
 
 from quiltcli import binning, draw, raster
 from quiltcli.display import Facets
-from quiltcli.draw import Stage, draw_frame, new_buffers, stage_of
-from quiltcli.job import JobFile
-from quiltcli.layout import align
-from quiltcli.packing import pack
-from quiltcli.scene import Scene
+from quiltcli.draw import Stage, draw_frame, new_buffers
 
 EYE = viewer((2.2, 1.8, 3.2))
 PIXELS = 400_000  # of all facets together, lit or not
@@ -46,38 +42,6 @@ def done(stage: Stage) -> Counter[str]:
         draw_frame(stage, EYE, buffers, dirty=clean)
     counts["evaluated"] = counts["small"] + counts["large"]
     return counts
-
-
-def ball_scene(splits: int, radius: float = 0.8) -> Scene:
-    vertices, triangles = icosphere(splits)
-    plain = wall(lights(ambient=(1, 1, 1)))
-    count = len(triangles)
-    return Scene(
-        vertices=vertices * radius,
-        triangles=triangles,
-        normals=vertices.astype(np.float32),
-        colors=np.ones(vertices.shape, np.float32),
-        flat=np.zeros(count, bool),
-        object=np.zeros(count, np.int32),
-        material=np.zeros(count, np.int32),
-        objects=("ball",),
-        materials=plain.materials,
-        lights=plain.lights,
-        background=np.zeros(3, np.float32),
-        notices=(),
-    )
-
-
-def stage_of_facets(facets: Facets, scene: Scene) -> Stage:
-    path = {"keyframes": [{"frame": 1, "position": [0, 0, 2], "look_at": [0, 0, 0]}]}
-    spec = {
-        "display": "d.yaml",
-        "scene": "s.obj",
-        "frames": "1",
-        "viewer": {"near": 0.1, "far": 9, "path": path},
-    }
-    facets, layout = align(pack(facets, "rows"), facets)
-    return stage_of(JobFile.model_validate(spec), facets, layout, scene, bleed=0)
 
 
 def ball_display(splits: int, pixels: float = PIXELS) -> Facets:

@@ -8,55 +8,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig import cube, icosphere, viewer
-from wallscene import lights, wall
+from ballstage import ball_scene, stage_of_facets
+from rig import cube, viewer
+from wallscene import lights
 
 from quiltcli import pool as pools
-from quiltcli.draw import draw_frame, new_buffers, stage_of
+from quiltcli.draw import draw_frame, new_buffers
 from quiltcli.errors import CheckFailedError
-from quiltcli.job import JobFile
-from quiltcli.layout import align
-from quiltcli.packing import pack
 from quiltcli.pool import Pool, can_fork, shared_buffers
-from quiltcli.scene import Scene
 
 pytestmark = pytest.mark.skipif(not can_fork(), reason="processes cannot fork here")
 
 EYES = [(2.2, 1.8, 3.2), (-2.5, 1.2, 2), (0.2, 4, 0.3)]
 
 
-def job() -> JobFile:
-    path = {"keyframes": [{"frame": 1, "position": [0, 0, 2], "look_at": [0, 0, 0]}]}
-    spec = {
-        "display": "d.yaml",
-        "scene": "s.obj",
-        "frames": "1",
-        "viewer": {"near": 0.1, "far": 9, "path": path},
-    }
-    return JobFile.model_validate(spec)
-
-
 @pytest.fixture(scope="module")
 def stage():
-    facets, layout = align(pack(facets := cube(), "rows"), facets)
-    vertices, triangles = icosphere(3)
-    plain = wall(lights(sun=[(-1, -1, -1)], color=[(2, 2, 2)], ambient=(0.1, 0.1, 0.1)))
-    count = len(triangles)
-    scene = Scene(
-        vertices=vertices * 0.9,
-        triangles=triangles,
-        normals=vertices.astype(np.float32),
-        colors=np.ones(vertices.shape, np.float32),
-        flat=np.zeros(count, bool),
-        object=np.zeros(count, np.int32),
-        material=np.zeros(count, np.int32),
-        objects=("ball",),
-        materials=plain.materials,
-        lights=plain.lights,
-        background=np.float32([0.1, 0, 0.2]),
-        notices=(),
-    )
-    return stage_of(job(), facets, layout, scene, bleed=2)
+    lamps = lights(sun=[(-1, -1, -1)], color=[(2, 2, 2)], ambient=(0.1, 0.1, 0.1))
+    return stage_of_facets(cube(), ball_scene(3, 0.9, lamps, (0.1, 0, 0.2)), bleed=2)
 
 
 def test_workers_draw_the_same_pixels_as_one_process(stage):
