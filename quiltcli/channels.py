@@ -5,7 +5,7 @@ To add a channel, add a row to `CHANNELS` and its name to the job's list of chan
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import FloatArray
-from quiltcli.raster.hits import Hits
+from quiltcli.raster.hits import Hits, Wanted
 from quiltcli.scene import Scene
-from quiltcli.shading import MOST_HALF, shade, shading_normals
+from quiltcli.shading import MOST_HALF, shade, shading_normals, shading_wants
 from quiltcli.viewer import Viewer
 
 Values: TypeAlias = NDArray[Any]
@@ -29,25 +29,16 @@ class Channel:
         layers: names of its EXR channels.
         dtype: their pixel type.
         empty: value of a pixel that sees nothing.
-        values: from scene, viewer and hits to (layers, k, G), or (layers, 1, G) where a group's
+        values: from scene, viewer and hits to an array for each layer, (G, k), or (G, 1) where a group's
             pixels all have one value, of any float or integer type.
+        wanted: what of the hits that takes beside triangle and depth.
     """
 
     layers: tuple[str, ...]
     dtype: np.dtype[Any]
     empty: float
-    values: Callable[[Scene, Viewer, Hits], Values]
-
-
-def depth(viewer: Viewer, position: FloatArray) -> FloatArray:
-    """Depth (k, G) float64 of points (3, k, G) given relative to the eye, metres.
-
-    Along the look direction, or the distance from the eye where the viewer's depth is `radial`.
-    """
-    x, y, z = position
-    if viewer.depth == "radial":
-        return np.asarray(np.sqrt(x * x + y * y + z * z))
-    return np.asarray(x * viewer.look[0] + y * viewer.look[1] + z * viewer.look[2])
+    values: Callable[[Scene, Viewer, Hits], Values | Sequence[Values]]
+    wanted: Callable[[Scene], Wanted] = lambda _: Wanted()
 
 
 def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
@@ -56,37 +47,37 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
     return np.asarray((far + near) / (far - near) - 2 * far * near / ((far - near) * z))
 
 
-def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    rgba = np.ones((4, *hits.pixel.shape), dtype=np.float32)
-    np.minimum(shade(scene, viewer.eye, hits), MOST_HALF, out=rgba[:3])
-    return rgba
+def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Sequence[Values]:
+    rgb = shade(scene, viewer.eye, hits)
+    return *half_floats(np.minimum(rgb, MOST_HALF, out=rgb)), np.ones((1, 1), dtype=np.float16)
 
 
 def _depth(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return depth(viewer, hits.position)[None]
+    return hits.depth[None]
 
 
 def _canonical_depth(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return canonical_depth(viewer, depth(viewer, hits.position))[None]
+    return canonical_depth(viewer, hits.depth)[None]
 
 
 def _facet(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.facet[None, None] + 1
+    return hits.facet[None, :, None] + 1
 
 
 def _object(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return scene.object.take(hits.triangle)[None, None] + 1
+    return scene.object.take(hits.triangle)[None, :, None] + 1
 
 
 def _triangle(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.triangle[None, None] + 1
+    return hits.triangle[None, :, None] + 1
 
 
 def _normal(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return shading_normals(scene, hits)
+    return shading_normals(hits)
 
 
 def _point(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
+    assert hits.position is not None
     return hits.position + viewer.eye[:, None, None]
 
 
@@ -95,14 +86,16 @@ _HALF, _FLOAT, _UINT = np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.u
 # Depths are measured in double precision and rounded once. A pixel that sees nothing is infinitely
 # far in `zv` as well as in `Z`, so that it cannot be taken for one on the far plane, where zv is 1.
 CHANNELS: dict[str, Channel] = {
-    "rgba": Channel(("R", "G", "B", "A"), _HALF, 0.0, _rgba),
+    "rgba": Channel(("R", "G", "B", "A"), _HALF, 0.0, _rgba, shading_wants),
     "Z": Channel(("Z",), _FLOAT, np.inf, _depth),
     "zv": Channel(("zv",), _FLOAT, np.inf, _canonical_depth),
     "facet": Channel(("facet",), _UINT, 0.0, _facet),
     "object": Channel(("object",), _UINT, 0.0, _object),
     "triangle": Channel(("triangle",), _UINT, 0.0, _triangle),
-    "N": Channel(("N.X", "N.Y", "N.Z"), _HALF, 0.0, _normal),
-    "P": Channel(("P.X", "P.Y", "P.Z"), _FLOAT, 0.0, _point),
+    "N": Channel(
+        ("N.X", "N.Y", "N.Z"), _HALF, 0.0, _normal, lambda scene: Wanted(normals=scene.corner_normals)
+    ),
+    "P": Channel(("P.X", "P.Y", "P.Z"), _FLOAT, 0.0, _point, lambda _: Wanted(position=True)),
 }
 
 
@@ -117,6 +110,16 @@ def empty_buffers(names: Iterable[str], pixels: int) -> dict[str, Values]:
     return {layer: np.full(pixels, empty, dtype) for layer, (dtype, empty) in exr_channels(names).items()}
 
 
+def wanted_for(names: Iterable[str], scene: Scene) -> Wanted:
+    """What the hits have to tell for these channels."""
+    each = [CHANNELS[name].wanted(scene) for name in names]
+    return Wanted(
+        normals=next((one.normals for one in each if one.normals is not None), None),
+        weights=any(one.weights for one in each),
+        position=any(one.position for one in each),
+    )
+
+
 def fill(
     buffers: Mapping[str, Values], names: Iterable[str], scene: Scene, viewer: Viewer, hits: Hits
 ) -> None:
@@ -124,4 +127,19 @@ def fill(
     for name in names:
         row = CHANNELS[name]
         for layer, values in zip(row.layers, row.values(scene, viewer, hits), strict=True):
-            buffers[layer][hits.pixel] = values.astype(row.dtype)
+            hits.put(buffers[layer], values)
+
+
+def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
+    """As `astype(np.float16)` for numbers from 0 to the largest half float, in a fraction of the time.
+
+    A product with 2⁻¹¹² has the exponent of a half float, small ones denormal as theirs are; then the
+    bits that a half float lacks are rounded away, to the nearest and if there are two to the even.
+    """
+    bits = (values * np.float32(2.0**-112)).view(np.uint32)
+    odd = bits >> np.uint32(13)
+    odd &= np.uint32(1)
+    bits += odd
+    bits += np.uint32(0x0FFF)
+    bits >>= np.uint32(13)
+    return bits.astype(np.uint16).view(np.float16)

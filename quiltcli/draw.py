@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.binning import Pairs, Parts, bin_triangles, facet_parts
-from quiltcli.channels import CHANNELS, empty_buffers, exr_channels, fill
+from quiltcli.channels import empty_buffers, exr_channels, fill, wanted_for
 from quiltcli.display import Facets, lit_facets, load_display
 from quiltcli.geometry import BoolArray, FloatArray, OwnerArray, dot
 from quiltcli.homography import quilt_rays
@@ -40,7 +40,7 @@ from quiltcli.raster import (
 )
 from quiltcli.report import FrameRecord
 from quiltcli.scene import Scene, load_scene
-from quiltcli.shading import MOST_HALF
+from quiltcli.shading import MOST_HALF, shade, shading_wants
 from quiltcli.viewer import Viewer
 
 Buffers = dict[str, NDArray[Any]]
@@ -237,8 +237,11 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
     if samples > 1:
         draw_samples(stage, frame, batch, buffers, samples)
         channels = tuple(name for name in channels if name != "rgba")
+    wanted = wanted_for(channels, stage.scene)
+    if frame.order is not None:
+        wanted = replace(wanted, position=True)
     visible = 0
-    for hits in rasterize(frame, batch):
+    for hits in rasterize(frame, batch, wanted=wanted):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)
@@ -260,18 +263,20 @@ def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits) -> None:
     """Write into `zv` what the depth buffer holds, and into `Z` the depth that it is taken for."""
     wanted = [name for name in ("zv", "Z") if name in buffers]
     if wanted:
+        assert hits.position is not None
         stored = dict(zip(("zv", "Z"), order.stored(hits.facet, hits.position), strict=True))
         for name in wanted:
-            buffers[name][hits.pixel] = stored[name]
+            hits.put(buffers[name], stored[name])
 
 
 def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, samples: int) -> None:
     """Average the colour of several samples a pixel; what misses the scene counts as background."""
-    found = [
-        (hits.pixel.ravel(), CHANNELS["rgba"].values(stage.scene, frame.viewer, hits).reshape(4, -1))
-        for sample in sample_places(samples)
-        for hits in rasterize(frame, batch, sample)
-    ]
+    found = []
+    for sample in sample_places(samples):
+        for hits in rasterize(frame, batch, sample, shading_wants(stage.scene)):
+            rgba = np.ones((4, hits.depth.size), dtype=np.float32)
+            np.minimum(shade(stage.scene, frame.viewer.eye, hits).reshape(3, -1), MOST_HALF, out=rgba[:3])
+            found.append((hits.pixel.ravel(), rgba))
     if not found or "rgba" not in stage.job.output.channels:
         return
     pixel = np.concatenate([p for p, _ in found])

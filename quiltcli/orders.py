@@ -88,16 +88,16 @@ class DepthOrder:
 
         Args:
             hits_facet: (G,) facet index.
-            position: (3, k, G) points minus eye, metres.
+            position: (3, G, k) points minus eye, metres.
 
         Returns:
-            (k, G) canonical depth, rounded; and (k, G) the depth in metres that the viewer's own
+            (G, k) canonical depth, rounded; and (G, k) the depth in metres that the viewer's own
             buffer would mean by this value: equation 4 solved for Z.
         """
         gain = self.gain(*position)
-        across = np.moveaxis(self.across[hits_facet], 1, 0)
+        across = np.moveaxis(self.across[hits_facet], 1, 0)[:, :, None]
         t = across[0] * position[0] + across[1] * position[1] + across[2] * position[2]
-        held = rounded(self.canonical(hits_facet, gain / t, 1 / t), self.bits)
+        held = rounded(self.canonical(hits_facet[:, None], gain / t, 1 / t), self.bits)
         near, far = self.viewer.near, self.viewer.far
         return held, 2 * far * near / ((far + near) - held * (far - near))
 

@@ -8,18 +8,16 @@ pixel's value depends neither on the machine nor on which other pixels are shade
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array
-from quiltcli.raster.hits import Hits
-from quiltcli.scene import Materials, Scene
+from quiltcli.raster.hits import Hits, Wanted
+from quiltcli.scene import Scene
 
-# Arrays of this many pixels stay in the second-level cache from one operation to the next.
-BLOCK = 16384
 # Irradiance of the light at the eye; a white surface that faces it comes out near 1.
 HEADLIGHT = 3.0
 # Lights have no size: below this roughness their image in a surface would be too bright for half floats.
@@ -29,6 +27,8 @@ MOST_HALF = np.float32(65504)
 _DIELECTRIC = 0.04
 _LEAST_COSINE = np.float32(1e-4)
 _LEAST_DISTANCE2 = np.float32(1e-6)
+_LEAST_LENGTH2 = np.float32(1e-30)
+_ONE, _HALF = np.float32(1), np.float32(0.5)
 
 Values: TypeAlias = "Float32Array | np.float32"
 
@@ -37,11 +37,11 @@ Values: TypeAlias = "Float32Array | np.float32"
 class _Points:
     """Visible points in n groups of k, like the hits they come from.
 
-    What a material says is (n,), or a number where all points agree; vertex colours make it (k, n).
+    What a material says is (n, 1), or a number where all points agree; vertex colours make it (n, k).
 
     Attributes:
-        normal: (3, k, n) unit shading normals, on the side of the eye.
-        eyeward: (3, k, n) unit directions to the eye.
+        normal: (3, n, k) unit shading normals, on the side of the eye.
+        eyeward: (3, n, k) unit directions to the eye.
         base: 3 values, base colour.
         steady: 3 values, light that needs no lamp: ambient and emission, or the colour of an unlit surface.
         diffuse: share of light for the Lambert base, over π.
@@ -60,51 +60,43 @@ class _Points:
     alpha2: Values
 
 
+def shading_wants(scene: Scene) -> Wanted:
+    """What shading asks of hits."""
+    return Wanted(
+        normals=scene.corner_normals,
+        weights=scene.corner_colors is not None,
+        position=len(scene.lights.point_color) > 0,
+    )
+
+
 def shade(scene: Scene, eye: FloatArray, hits: Hits) -> Float32Array:
-    """Linear RGB (3, k, G) float32 of every hit.
+    """Linear RGB (3, G, k) float32 of every hit.
 
     Args:
         scene: the scene.
         eye: (3,) world metres.
-        hits: G groups of k visible points.
+        hits: G groups of k visible points, with what `shading_wants` asks for.
     """
-    table = _material_table(scene.materials, scene.lights.ambient)
-    result = np.empty((3, *hits.pixel.shape), dtype=np.float32)
-    for part in _blocks(hits):
-        points = _points(scene, table, hits, part)
-        result[:, :, part] = _radiance(scene, eye, hits.position[:, :, part], points)
-    return result
+    return _radiance(scene, eye, hits, _points(scene, hits))
 
 
-def shading_normals(scene: Scene, hits: Hits) -> Float32Array:
-    """Unit normals (3, k, G) float32 as shading uses them: interpolated, on the side of the eye."""
-    result = np.empty((3, *hits.pixel.shape), dtype=np.float32)
-    for part in _blocks(hits):
-        result[:, :, part] = _normals(scene, hits, part)[0]
-    return result
+def shading_normals(hits: Hits) -> Float32Array:
+    """Unit normals (3, G, k) float32 as shading uses them: interpolated, on the side of the eye."""
+    assert hits.normal is not None
+    return _unit(hits.normal)
 
 
-def _blocks(hits: Hits) -> Iterator[slice]:
-    """Groups of hits, about `BLOCK` pixels at a time."""
-    pixels, groups = hits.pixel.shape
-    step = max(BLOCK // pixels, 1)
-    for start in range(0, groups, step):
-        yield slice(start, start + step)
-
-
-def _points(scene: Scene, table: Float32Array, hits: Hits, part: slice) -> _Points:
-    normal, eyeward = _normals(scene, hits, part)
-    triangle = hits.triangle[part]
-    rows = _materials_at(table, scene.material.take(triangle))
+def _points(scene: Scene, hits: Hits) -> _Points:
+    rows = _materials_at(_material_table(scene), scene.material.take(hits.triangle))
     base, ambient, emission = rows[0:3], rows[3:6], rows[6:9]
     diffuse, metallic, dielectric, specular90, alpha2 = rows[9:14]
     if scene.corner_colors is not None:
-        color = _interpolated(scene.corner_colors, triangle, hits, part)
+        color = _colors(scene.corner_colors, hits)
         base = tuple(v * c for v, c in zip(base, color, strict=True))
         ambient = tuple(v * c for v, c in zip(ambient, color, strict=True))
     return _Points(
-        normal=normal,
-        eyeward=eyeward,
+        normal=shading_normals(hits),
+        eyeward=_unit(hits.ray, -_ONE),
         base=base,
         steady=tuple(a + e for a, e in zip(ambient, emission, strict=True)),
         diffuse=diffuse,
@@ -114,22 +106,26 @@ def _points(scene: Scene, table: Float32Array, hits: Hits, part: slice) -> _Poin
     )
 
 
-def _normals(scene: Scene, hits: Hits, part: slice) -> tuple[Float32Array, Float32Array]:
-    """Unit shading normals on the side of the eye, and unit directions to the eye, both (3, k, n).
-
-    The triangle's own normal decides which side the eye is on, so interpolation cannot turn a
-    silhouette inside out.
-    """
-    eyeward = hits.position[:, :, part].astype(np.float32)
-    eyeward *= np.float32(-1) / np.sqrt(_dot(eyeward, eyeward))
-    normal, own = _interpolated(scene.corner_normals, hits.triangle[part], hits, part, extra=True)
-    length = np.sqrt(_dot(normal, normal) + np.float32(1e-30))
-    normal *= np.copysign(np.float32(1), _dot(own, eyeward)) / length
-    return normal, eyeward
+def _unit(vectors: Float32Array, sign: np.float32 = _ONE) -> Float32Array:
+    """Unit vectors along the first axis, times `sign`."""
+    length2 = _dot(vectors, vectors)
+    length2 += _LEAST_LENGTH2
+    scale = np.divide(sign, np.sqrt(length2, out=length2), out=length2)
+    return np.asarray(vectors * scale)
 
 
-def _radiance(scene: Scene, eye: FloatArray, position: FloatArray, points: _Points) -> Float32Array:
-    """Light (3, k, n) towards the eye from all lamps and from none."""
+def _colors(table: Float32Array, hits: Hits) -> Float32Array:
+    """Vertex colours (3, n, k) between a triangle's corners."""
+    assert hits.weights is not None
+    rows = np.ascontiguousarray(table.take(hits.triangle, axis=0).T)[:, :, None]
+    value = rows[3:6] * hits.weights[0]
+    value += rows[0:3]
+    value += rows[6:9] * hits.weights[1]
+    return value
+
+
+def _radiance(scene: Scene, eye: FloatArray, hits: Hits, points: _Points) -> Float32Array:
+    """Light (3, n, k) towards the eye from all lamps and from none."""
     lights = scene.lights
     result = np.empty(points.normal.shape, dtype=np.float32)
     for k in range(3):
@@ -140,7 +136,8 @@ def _radiance(scene: Scene, eye: FloatArray, position: FloatArray, points: _Poin
     for direction, color in zip(lights.directional_direction, lights.directional_color, strict=True):
         _add_light(result, points, nv, -direction, color)
     for place, color in zip(lights.point_position, lights.point_color, strict=True):
-        offset = (place - eye).astype(np.float32)[:, None, None] - position.astype(np.float32)
+        assert hits.position is not None
+        offset = (place - eye).astype(np.float32)[:, None, None] - hits.position.astype(np.float32)
         nearness = np.reciprocal(np.maximum(_dot(offset, offset), _LEAST_DISTANCE2))
         offset *= np.sqrt(nearness)
         _add_light(result, points, nv, offset, color, nearness)
@@ -164,33 +161,59 @@ def _add_light(
     the layer lets in and out again, so no surface returns more than it receives.
 
     Args:
-        result: (3, k, n), added to.
+        result: (3, n, k), added to.
         points: the points.
-        nv: (k, n) cosine between normal and eye; below 0 where interpolation turns a normal away.
-        light: (3, k, n) unit directions to the lamp, or (3,) for all.
+        nv: (n, k) cosine between normal and eye; below 0 where interpolation turns a normal away.
+        light: (3, n, k) unit directions to the lamp, or (3,) for all.
         color: (3,) irradiance on a surface that faces the lamp.
-        falloff: (k, n) factor of `color`.
+        falloff: (n, k) factor of `color`.
     """
-    one, half = np.float32(1), np.float32(0.5)
     nl = np.maximum(_dot(points.normal, light), np.float32(0))
-    half_angle = np.maximum(one + _dot(points.eyeward, light), _LEAST_COSINE)
+    half_angle = _dot(points.eyeward, light)
+    half_angle += _ONE
+    np.maximum(half_angle, _LEAST_COSINE, out=half_angle)
     # From the cosines as they are: a normal that is bent past the silhouette must not pretend to face
     # the half vector, or light from behind would glint along every outline.
-    total = np.maximum(nl + nv, np.float32(0))
+    nh2 = np.maximum(nl + nv, np.float32(0))
     nv = np.maximum(nv, _LEAST_COSINE)
-    nh2 = np.minimum(half * total * total / half_angle, one)
+    nh2 *= nh2
+    half_angle *= _HALF
+    nh2 /= half_angle
+    np.minimum(nh2 * np.float32(0.25), _ONE, out=nh2)
     a2 = points.alpha2
-    rest = one - a2
-    spread = one - nh2 * rest
-    masking = nl * np.sqrt(a2 + rest * nv * nv) + nv * np.sqrt(a2 + rest * nl * nl)
+    rest = _ONE - a2
+    spread = np.multiply(nh2, rest, out=nh2)
+    np.subtract(_ONE, spread, out=spread)
+    masking = _shadowing(nl, nv, a2, rest)
+    masking += _shadowing(nv, nl, a2, rest)
     received = nl if falloff is None else nl * falloff
-    specular = received * a2 * np.float32(0.5 / math.pi) / (spread * spread * masking)
-    grazing = _fifth(one - np.sqrt(half * half_angle))
-    layer = specular * (one - grazing)
-    rim = specular * grazing * points.specular90
-    base = received * points.diffuse * (one - _fifth(one - nl)) * (one - _fifth(one - nv))
+    spread *= spread
+    spread *= masking
+    specular = received * (a2 * np.float32(0.5 / math.pi))
+    specular /= spread
+    grazing = _fifth(np.sqrt(half_angle, out=half_angle))
+    rim = specular * grazing
+    specular -= rim
+    rim *= points.specular90
+    base = _fifth(nl)
+    np.subtract(_ONE, base, out=base)
+    away = _fifth(nv)
+    base *= np.subtract(_ONE, away, out=away)
+    base *= received
     for k in range(3):
-        result[k] += color[k] * (points.base[k] * base + points.specular0[k] * layer + rim)
+        result[k] += color[k] * rim
+        result[k] += (color[k] * points.base[k] * points.diffuse) * base
+        result[k] += (color[k] * points.specular0[k]) * specular
+
+
+def _shadowing(one: Float32Array, other: Float32Array, a2: Values, rest: Values) -> Float32Array:
+    """The first cosine times √(a² + (1 − a²)·other²), a term of Smith's masking and shadowing."""
+    result: Float32Array = other * other
+    result *= rest
+    result += a2
+    np.sqrt(result, out=result)
+    result *= one
+    return result
 
 
 def _dot(a: Float32Array, b: Float32Array) -> Float32Array:
@@ -199,24 +222,19 @@ def _dot(a: Float32Array, b: Float32Array) -> Float32Array:
     return result
 
 
-def _fifth(x: Float32Array) -> Float32Array:
-    square = x * x
-    return square * square * x
+def _fifth(cosine: Float32Array) -> Float32Array:
+    """(1 − cosine)⁵, of Schlick's approximation."""
+    rest = _ONE - cosine
+    result: Float32Array = rest * rest
+    result *= result
+    result *= rest
+    return result
 
 
-def _interpolated(
-    table: Float32Array, triangle: Int32Array, hits: Hits, part: slice, *, extra: bool = False
-) -> Any:
-    """Values (3, k, n) between a triangle's corners; with `extra` also the table's last columns (3, 1, n)."""
-    rows = np.ascontiguousarray(table.take(triangle, axis=0).T)[:, None]
-    value = hits.b[:, part] * rows[3:6]
-    value += rows[0:3]
-    value += hits.c[:, part] * rows[6:9]
-    return (value, rows[9:12]) if extra else value
-
-
-def _material_table(materials: Materials, ambient: Float32Array) -> Float32Array:
+@lru_cache(maxsize=1)
+def _material_table(scene: Scene) -> Float32Array:
     """The materials as the lamp loop wants them (M, 14): the values of `_Points`, in its order."""
+    materials, ambient = scene.materials, scene.lights.ambient
     lit = (~materials.unlit).astype(np.float32)
     alpha = np.maximum(materials.roughness, np.float32(LEAST_ROUGHNESS)) ** 2
     table = np.empty((len(lit), 14), dtype=np.float32)
@@ -232,8 +250,9 @@ def _material_table(materials: Materials, ambient: Float32Array) -> Float32Array
 
 
 def _materials_at(table: Float32Array, material: Int32Array) -> tuple[Values, ...]:
-    """The columns of the table at each point, as plain numbers where one material has all points."""
-    first = material[0]
-    if len(table) == 1 or bool((material == first).all()):
-        return tuple(table[first])
-    return tuple(np.ascontiguousarray(table.take(material, axis=0).T))
+    """The columns of the table at each group, as plain numbers where one material has all groups."""
+    if len(table) == 1:
+        return tuple(table[0])
+    if bool((material == material[0]).all()):
+        return tuple(table[material[0]])
+    return tuple(np.ascontiguousarray(table.take(material, axis=0).T)[:, :, None])

@@ -43,6 +43,16 @@ class Viewer:
         """Rotation (3, 3) with the rows right, up, −look; apply it to world minus eye."""
         return np.stack((cross(self.look, self.up), self.up, -self.look))
 
+    def depth_of(self, position: FloatArray) -> FloatArray:
+        """Depth (...) float64 of points (3, ...) given relative to the eye, metres.
+
+        Along the look direction, or the distance from the eye where depth is `radial`.
+        """
+        x, y, z = position
+        if self.depth == "radial":
+            return np.asarray(np.sqrt(x * x + y * y + z * z))
+        return np.asarray(x * self.look[0] + y * self.look[1] + z * self.look[2])
+
 
 def viewer_at(spec: ViewerSpec, frame: int, depth: str = "planar") -> Viewer:
     """The viewer of one frame.

@@ -140,10 +140,8 @@ def picture(
     for batch in batches(frame):
         for hits in rasterize(frame, batch, sample):
             assert (triangle[hits.pixel] == -1).all(), "a pixel came twice"
-            triangle[hits.pixel] = hits.triangle
-            x, y, z = hits.position
-            planar = x * eye.look[0] + y * eye.look[1] + z * eye.look[2]
-            depth[hits.pixel] = planar if eye.depth == "planar" else np.sqrt(x * x + y * y + z * z)
+            hits.put(triangle, hits.triangle[:, None])
+            hits.put(depth, hits.depth)
     return Picture(facets, layout, owners.astype(np.int64), rays, frame, pairs, triangle, depth)
 
 

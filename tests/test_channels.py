@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from wallscene import EYE, STRAIGHT, hits, lights, wall
 
-from quiltcli.channels import CHANNELS, canonical_depth, depth, empty_buffers, exr_channels, fill
+from quiltcli.channels import CHANNELS, canonical_depth, empty_buffers, exr_channels, fill
 from quiltcli.job.render import CHANNELS as KNOWN_TO_JOBS
 from quiltcli.viewer import Viewer
 
@@ -52,8 +52,8 @@ def test_too_bright_for_half_is_the_largest_half():
 
 def test_planar_and_radial_depth():
     seen = hits([[3.0], [0.0], [-4.0]])
-    assert depth(VIEWER, seen.position).tolist() == [[4]]
-    assert depth(replace(VIEWER, depth="radial"), seen.position).tolist() == [[5]]
+    assert VIEWER.depth_of(seen.position).tolist() == [[4]]
+    assert replace(VIEWER, depth="radial").depth_of(seen.position).tolist() == [[5]]
     assert filled("Z", seen=seen)["Z"].tolist() == [4, np.inf]
 
 
@@ -82,5 +82,5 @@ def test_normals_face_the_eye():
 
 
 def test_hits_go_to_their_own_pixels():
-    seen = replace(hits([[0.0, 0], [0, 0], [-2, -3]]), pixel=np.array([[3, 1]]))
+    seen = replace(hits([[0.0, 0], [0, 0], [-2, -3]]), first=np.array([3, 1]))
     assert filled("Z", seen=seen, pixels=4)["Z"].tolist() == [np.inf, 3, np.inf, 2]

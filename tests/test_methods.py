@@ -182,7 +182,7 @@ def drawn(shown, order: DepthOrder):
     triangle = np.full(shown.owners.size, -1)
     for batch in batches(frame):
         for hits in rasterize(frame, batch):
-            triangle[hits.pixel] = hits.triangle
+            hits.put(triangle, hits.triangle[:, None])
     return triangle
 
 

@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wallscene import EYE, STRAIGHT, hits, lights, materials, wall
+from wallscene import EYE, STRAIGHT, hits, lights, materials, on, wall
 
 from quiltcli import shading
 from quiltcli.geometry import normalized
 from quiltcli.scene import Materials
 
 
-def shade(*args):
-    return shading.shade(*args).reshape(3, -1)
+def shade(scene, eye, seen):
+    return shading.shade(scene, eye, on(scene, seen)).reshape(3, -1)
 
 
-def shading_normals(*args):
-    return shading.shading_normals(*args).reshape(3, -1)
+def shading_normals(scene, seen):
+    return shading.shading_normals(on(scene, seen)).reshape(3, -1)
 
 
 def reference(normal, eyeward, light, color, metallic, roughness):
@@ -153,7 +153,7 @@ def test_white_furnace_returns_no_more_than_it_gets(metallic, roughness, slope):
     assert 0.25 < share < 1.005
 
 
-def test_bytes_do_not_depend_on_the_blocks(monkeypatch):
+def test_bytes_do_not_depend_on_what_is_shaded_together():
     rng = np.random.default_rng(3)
     scene = wall(lights([[0.1, -1, -0.3]], [[3, 3, 3]], [[1, 1, 1]], [[2, 2, 2]], headlight=True))
     two = Materials(
@@ -164,11 +164,13 @@ def test_bytes_do_not_depend_on_the_blocks(monkeypatch):
         scene, triangles=np.repeat(scene.triangles, 2, 0), flat=np.zeros(2, bool),
         material=np.array([0, 1], np.int32), materials=two,
     )  # fmt: skip
-    position = rng.normal(size=(3, 500))
-    seen = hits(position, rng.random(500) / 2, rng.random(500) / 2, np.arange(500) > 250)
-    whole = shade(scene, EYE, seen)
-    monkeypatch.setattr(shading, "BLOCK", 7)
-    np.testing.assert_array_equal(whole, shade(scene, EYE, seen))
+    position, weights = rng.normal(size=(3, 500)), rng.random((2, 500)) / 2
+    triangle = np.arange(500) > 250
+    whole = shade(scene, EYE, hits(position, *weights, triangle, scene))
+    for at in range(0, 500, 7):
+        part = slice(at, at + 7)
+        seen = hits(position[:, part], *weights[:, part], triangle[part], scene)
+        np.testing.assert_array_equal(shade(scene, EYE, seen), whole[:, part])
 
 
 def test_no_hits_is_no_light():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quiltcli.raster.hits import Hits
+from quiltcli.raster.hits import point_hits
 from quiltcli.scene import Lights, Materials, Scene
 
 EYE = np.array([0.0, 0.0, 2.0])
@@ -45,18 +45,26 @@ def wall(lamps, **material):
     )
 
 
-def hits(position, b=0.25, c=0.5, triangle=None):
+def hits(position, b=0.25, c=0.5, triangle=None, scene=None):
+    """Points on a scene's triangles, or on those of a wall."""
     position = np.array(position, np.float64).reshape(3, -1)
     count = position.shape[1]
-    return Hits(
-        pixel=np.arange(count)[None],
+    return point_hits(
+        first=np.arange(count),
         facet=np.zeros(count, np.int32),
         triangle=np.zeros(count, np.int32) if triangle is None else np.array(triangle, np.int32),
-        b=np.broadcast_to(np.float32(b), count)[None],
-        c=np.broadcast_to(np.float32(c), count)[None],
-        position=position[:, None],
+        position=position,
+        weights=np.stack((np.broadcast_to(b, count), np.broadcast_to(c, count))),
+        depth=-position[2],
+        normals=(scene or wall(lights())).corner_normals,
         inside=count,
     )
+
+
+def on(scene, seen):
+    """The same points with the normals of another scene."""
+    weights = seen.weights.astype(np.float64)[:, :, 0]
+    return hits(seen.position, *weights, triangle=seen.triangle, scene=scene)
 
 
 STRAIGHT = hits([[0.0], [0.0], [-2.0]])

@@ -18,9 +18,10 @@ import numpy as np
 from quiltcli.channels import fill
 from quiltcli.display import lit_facets
 from quiltcli.draw import Buffers, Stage, clear, lay_background
-from quiltcli.geometry import BoolArray, FloatArray, IntArray, cross, dot
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
 from quiltcli.homography import quilt_rays
 from quiltcli.raster import Hits
+from quiltcli.raster.hits import point_hits
 from quiltcli.raster.planes import LATTICE
 from quiltcli.rays.embree import Target, aim, cast, plane_depth, plane_distance
 from quiltcli.rays.exact import Neighbours, intersect
@@ -53,8 +54,9 @@ def cast_frame(
     lay_background(stage, rays.lit, buffers)
 
     def draw(address: IntArray) -> int:
-        hits = cast_pixels(target, neighbours, places(address, stage.layout, stage.owners, rays))
-        if hits.pixel.size:
+        pixels = places(address, stage.layout, stage.owners, rays)
+        hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals)
+        if hits.first.size:
             fill(buffers, stage.job.output.channels, stage.scene, viewer, hits)
         return hits.inside
 
@@ -83,8 +85,8 @@ def pixels_of(stage: Stage, lit: BoolArray) -> Iterator[IntArray]:
             yield chunk + start
 
 
-def cast_pixels(target: Target, neighbours: Neighbours, pixels: Places) -> Hits:
-    """What P pixels see."""
+def cast_pixels(target: Target, neighbours: Neighbours, pixels: Places, normals: Float32Array) -> Hits:
+    """What P pixels see; `normals` are the scene's `corner_normals`."""
     triangle = first_triangles(target, neighbours, pixels)
     rows = np.flatnonzero(triangle >= 0)
     triangle = triangle[rows]
@@ -92,14 +94,15 @@ def cast_pixels(target: Target, neighbours: Neighbours, pixels: Places) -> Hits:
     matrix = pixels.ray[rows]
     ray = matrix[:, :, 0] * x + matrix[:, :, 1] * y + matrix[:, :, 2]
     position = ray * plane_distance(target, triangle, ray)[:, None]
-    b, c = _weights(target, triangle, position)
-    return Hits(
-        pixel=pixels.address[rows][None],
+    points = np.ascontiguousarray(position.T)
+    return point_hits(
+        first=pixels.address[rows],
         facet=pixels.facet[rows].astype(np.int32),
         triangle=triangle.astype(np.int32),
-        b=b.astype(np.float32)[None],
-        c=c.astype(np.float32)[None],
-        position=np.ascontiguousarray(position.T)[:, None],
+        position=points,
+        weights=np.stack(_weights(target, triangle, position)),
+        depth=target.viewer.depth_of(points),
+        normals=normals,
         inside=int(np.count_nonzero(~pixels.bleed[rows])),
     )
 

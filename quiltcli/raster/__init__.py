@@ -1,8 +1,9 @@
 """Rasterization: which triangle does each pixel's ray meet first?
 
 The stages, in order: `blocks` cuts the facets' rectangles into pieces that fit the cache; `prewarp`
-gives each pair of binning to its blocks and makes `planes` of it; `small` and `large` raise the depth
-`keys` of a canvas; `visibility` reads from the keys what each pixel sees.
+gives each pair of binning to its blocks and finds its pixels there; `small` and `large` make `planes`
+of the pairs and raise the depth `keys` of a canvas; `visibility` reads from the canvas which `surfaces`
+its pixels see, and where.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from quiltcli.homography import QuiltRays
 from quiltcli.orders import DepthOrder
 from quiltcli.raster.blocks import Blocks, block_window, cut_batches, cut_blocks, new_canvas, ray_matrices
 from quiltcli.raster.depth import DepthRange, triangles_in_range
-from quiltcli.raster.hits import Hits
+from quiltcli.raster.hits import Hits, Wanted
 from quiltcli.raster.keys import serial_bits
 from quiltcli.raster.large import draw_large
 from quiltcli.raster.order import BatchOrder
-from quiltcli.raster.planes import joined
-from quiltcli.raster.prewarp import BlockPairs, Sight, block_matrices, make_planes, split_pairs
+from quiltcli.raster.planes import PlaneTable
+from quiltcli.raster.prewarp import BlockPairs, Sight, block_matrices, split_pairs, warp
 from quiltcli.raster.small import LIMIT, draw_small
 from quiltcli.raster.visibility import read_canvas
 from quiltcli.viewer import Viewer
@@ -33,6 +34,7 @@ __all__ = [
     "Frame",
     "Hits",
     "Sight",
+    "Wanted",
     "batches",
     "block_window",
     "cut_blocks",
@@ -71,7 +73,10 @@ def batches(frame: Frame) -> list[tuple[int, int]]:
 
 
 def rasterize(
-    frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.0, 0.0)
+    frame: Frame,
+    batch: tuple[int, int],
+    sample: tuple[float, float] = (0.0, 0.0),
+    wanted: Wanted | None = None,
 ) -> Iterator[Hits]:
     """What the pixels of one batch see.
 
@@ -79,6 +84,7 @@ def rasterize(
         frame: the frame.
         batch: one of `batches(frame)`.
         sample: where in the pixel to look, in pixels from its centre.
+        wanted: what the hits shall tell beside the triangle, the ray and its depth.
 
     Yields:
         Hits of distinct pixels, each pixel of the batch at most once.
@@ -92,13 +98,11 @@ def rasterize(
     limits = DepthRange(viewer.near, viewer.far, viewer.depth == "radial", viewer.look, rays)
     by = None if frame.order is None else BatchOrder(frame.order, limits, frame.blocks.facet[block])
     matrices = block_matrices(frame.rays, frame.blocks, block, sample)
-    chunks = make_planes(frame.sight, frame.pairs, frame.blocks, block, matrices)
-    large = []
-    for planes in chunks:
-        extent = np.maximum(planes.box[1] - planes.box[0], planes.box[3] - planes.box[2])
-        draw_small(planes, np.flatnonzero(extent < LIMIT), canvas, limits, bits, by)
-        large.append(planes.take(np.flatnonzero(extent >= LIMIT)))
-    if large:
-        # All at once: the more a tile has been offered, the more of it is known to be hidden.
-        draw_large(joined(large), canvas, limits, bits, by)
-    yield from read_canvas(canvas, chunks, frame.blocks, rays, frame.owners, bits)
+    pairs = warp(frame.sight, frame.pairs, frame.blocks, block, matrices)
+    table = PlaneTable(pairs.triangle.size)
+    extent = np.maximum(pairs.box[1] - pairs.box[0], pairs.box[3] - pairs.box[2])
+    draw_small(pairs.take(np.flatnonzero(extent < LIMIT)), table, canvas, limits, bits, by)
+    # All at once: the more a tile has been offered, the more of it is known to be hidden.
+    large = table.add(pairs.take(np.flatnonzero(extent >= LIMIT)))
+    draw_large(large, canvas, limits, bits, by)
+    yield from read_canvas(canvas, table.planes, frame.blocks, limits, frame.owners, bits, wanted or Wanted())

@@ -162,27 +162,42 @@ def cut_batches(pair_counts: IntArray, blocks: Blocks) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Canvas:
-    """Depth keys of one batch, microtile by microtile, and where each microtile lies.
+    """What has been drawn of one batch, microtile by microtile, and where each microtile lies.
 
     Attributes:
         block: (K,) the batch's blocks, indices into `Blocks`.
         tile_start: (K+1,) offsets of every block's microtiles.
         tiles_across: (K,) microtiles from left to right in a block.
-        keys: (M·64,) int64, 0 where nothing has been drawn.
+        tiles_down: (K,) from top to bottom.
+        keys: (M, 64) int64 depth keys, 0 where nothing has been drawn.
+        touched: (M,) microtiles that have keys.
+        filler: (M,) one more than the serial of the one pair that shows in a microtile, fills it and
+            so needs no keys; 0 where there is none.
     """
 
     block: IntArray
     tile_start: IntArray
     tiles_across: IntArray
+    tiles_down: IntArray
     keys: IntArray
+    touched: BoolArray
+    filler: IntArray
 
 
 def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
     """An empty canvas for the blocks with these indices."""
     tiles = blocks.tile_start[block + 1] - blocks.tile_start[block]
     tile_start = np.concatenate(([0], np.cumsum(tiles)))
+    count = int(tile_start[-1])
+    across = blocks.tiles_across[block]
     return Canvas(
-        block, tile_start, blocks.tiles_across[block], np.zeros(int(tile_start[-1]) * 64, dtype=np.int64)
+        block=block,
+        tile_start=tile_start,
+        tiles_across=across,
+        tiles_down=tiles // across,
+        keys=np.zeros((count, 64), dtype=np.int64),
+        touched=np.zeros(count, dtype=np.bool_),
+        filler=np.zeros(count, dtype=np.int64),
     )
 
 

@@ -33,6 +33,12 @@ class DepthRange:
     look: FloatArray
     rays: FloatArray
 
+    @property
+    def handed(self) -> FloatArray:
+        """Sign (K,) of the determinant of every block's matrix, which tells mirrored blocks from others."""
+        u, v, o = self.rays.transpose(2, 0, 1)
+        return np.sign(dot(cross(u, v), o))
+
     def directions(
         self, block: Int32Array, x: FloatArray | IntArray, y: FloatArray | IntArray
     ) -> list[FloatArray]:

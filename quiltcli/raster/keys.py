@@ -19,7 +19,7 @@ def serial_bits(pairs: int) -> int:
     return max(LEAST_BITS, pairs.bit_length())
 
 
-def serial_part(serial: Int32Array, bits: int) -> IntArray:
+def serial_part(serial: Int32Array | IntArray, bits: int) -> IntArray:
     """The low bits of the keys of these serials."""
     result: IntArray = ((1 << bits) - 1) - serial.astype(np.int64)
     return result
@@ -37,4 +37,10 @@ def serial_of(keys: IntArray, bits: int) -> IntArray:
     """Serials of keys that are not 0."""
     mask = np.int64((1 << bits) - 1)
     result: IntArray = mask - (keys & mask)
+    return result
+
+
+def depth_part(keys: IntArray, bits: int) -> FloatArray:
+    """The least 1/t that keys may stand for; 0 for the key 0, and no key is negative."""
+    result: FloatArray = (keys & ~np.int64((1 << bits) - 1)).view(np.float64)
     return result

@@ -1,233 +1,330 @@
-"""Large triangles: tiles are rejected, hidden or drawn as a whole before any pixel is looked at.
+"""Large triangles: tiles are rejected, hidden or filled as a whole before any pixel is looked at.
 
 A triangle's box is cut into tiles of 64 pixels, those into microtiles of 8. The values of the edge
 functions at a tile's corners tell whether it lies outside, inside, or on an edge; a tile that a
-surface covers completely hides everything farther away in it. What remains is evaluated 64 pixels
-at a time, one pair a microtile and round, so that no two writes of a round meet.
+surface covers completely hides everything farther away in it. A microtile that one triangle fills
+with nothing else left in it is noted down by that triangle alone. What remains is evaluated 64
+pixels at a time, one pair a microtile and round, so that no two writes of a round meet.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
 from quiltcli.raster.blocks import SIDE, Canvas
 from quiltcli.raster.depth import DepthRange
-from quiltcli.raster.keys import make_keys, serial_part
+from quiltcli.raster.hits import BASIS
+from quiltcli.raster.keys import depth_part, make_keys, serial_part
 from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import Planes
 
 MICROTILE = 8
 TILE = 64
+_ACROSS = TILE // MICROTILE
+_SIZES = (1, 2, 4, 8)
+_CLASS_OF = np.searchsorted(np.asarray(_SIZES), np.arange(_ACROSS + 1))
+_CELLS = 1 << 15
 _ROUND = 512
 _EARLY = 3
-_X: FloatArray = np.tile(np.arange(8.0), 8)
-_Y: FloatArray = np.repeat(np.arange(8.0), 8)
-_BASIS = np.stack((_X, _Y, np.ones(64)))
+_X, _Y = (BASIS[k] for k in (0, 1))
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Parts of pairs that span at most 8 × 8 microtiles.
+
+    Attributes:
+        row: (R,) the pair, a row of `Planes`.
+        box: (4, R) first and last microtile column, first and last row in the block.
+    """
+
+    row: IntArray
+    box: IntArray
 
 
 @dataclass(frozen=True)
 class Spans:
-    """S (pair, tile) combinations that may hold fragments.
+    """S (pair, microtile) combinations that may hold fragments.
 
     Attributes:
         row: (S,) the pair, a row of `Planes`.
-        x: (S,) first pixel column of the tile in its block.
+        tile: (S,) the microtile's index in the canvas.
+        x: (S,) first pixel column of the microtile in its block.
         y: (S,) first pixel row.
-        crossed: (S,) bit k set where edge k crosses the tile; 0 means fully covered.
+        crossed: (S,) bit k set where edge k crosses the microtile; 0 means fully covered.
+        least: (S,) least 1/t in it.
+        greatest: (S,) greatest 1/t in it.
     """
 
     row: IntArray
+    tile: IntArray
     x: IntArray
     y: IntArray
-    crossed: IntArray
+    crossed: NDArray[np.uint8]
+    least: FloatArray
+    greatest: FloatArray
 
     def take(self, keep: IntArray) -> Spans:
         """The combinations with these indices."""
-        return Spans(self.row[keep], self.x[keep], self.y[keep], self.crossed[keep])
+        return Spans(*(getattr(self, field.name).take(keep) for field in fields(Spans)))
 
 
 def draw_large(
     planes: Planes, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None = None
 ) -> int:
-    """Draw pairs of any size; see `small.draw_small` for the arguments.
+    """Draw pairs of any size.
+
+    Args:
+        planes: the pairs.
+        canvas: what smaller pairs have left; its keys are raised, and microtiles that one pair fills noted.
+        limits: near and far, for pairs that reach beyond them.
+        bits: bits of the serial in a key.
+        by: what to order by instead of 1/t.
 
     Returns:
         Number of pixels that were evaluated.
     """
-    width = planes.box[1] - planes.box[0]
-    height = planes.box[3] - planes.box[2]
-    huge = np.maximum(width, height) >= TILE
-    rows = np.flatnonzero(huge)
-    tiles = _tile_spans(rows, planes.box[:, rows], TILE)
-    tiles = _classify(planes, tiles, TILE)
+    spans = _spans(planes, _pieces(planes, by is None), canvas)
     if by is None:
-        tiles = _hide(planes, tiles, canvas, TILE)
-    box = planes.box[:, tiles.row]
-    box[0::2] = np.maximum(box[0::2], (tiles.x, tiles.y))
-    box[1::2] = np.minimum(box[1::2], (tiles.x + TILE - 1, tiles.y + TILE - 1))
-    rows = np.flatnonzero(~huge)
-    spans = _merge(
-        _tile_spans(tiles.row, box, MICROTILE),
-        _tile_spans(rows, planes.box[:, rows], MICROTILE),
-    )
-    spans = _classify(planes, spans, MICROTILE)
-    if by is None:
-        spans = _hide(planes, spans, canvas, MICROTILE)
+        spans = _visible(planes, spans, canvas, bits)
+        spans = _fill(planes, spans, canvas)
     _draw_rounds(planes, spans, canvas, limits, bits, by)
-    return spans.row.size * 64
+    return spans.row.size * MICROTILE * MICROTILE
 
 
-def _tile_spans(rows: IntArray, box: Int32Array, size: int) -> Spans:
-    """All tiles of `size` pixels that the boxes (4, R) of some rows (R,) touch."""
-    x0, x1, y0, y1 = (box // size).astype(np.int64)
+def _pieces(planes: Planes, hide: bool) -> Pieces:
+    """The pairs, those that are wider or higher than 8 microtiles cut at the borders of tiles.
+
+    Tiles that a wide pair does not touch are left out, and with `hide` those that lie behind others.
+    """
+    x0, x1, y0, y1 = box = (planes.box >> 3).astype(np.int64)
+    wide = np.maximum(x1 - x0, y1 - y0) >= _ACROSS
+    near = np.flatnonzero(~wide)
+    if near.size == wide.size:
+        return Pieces(near, box)
+    row, x, y = _tiles(np.flatnonzero(wide), planes.box[:, wide])
+    least, greatest = _extremes(np.take(planes.edge, row, axis=2), x, y)
+    covered = np.all(least > 0, axis=0)
+    keep = np.all(greatest > 0, axis=0)
+    if hide:
+        keep &= ~_behind(planes, row, x, y, covered)
+    row, x, y = row[keep], x[keep] >> 3, y[keep] >> 3
+    ends = np.stack((x, x + _ACROSS - 1, y, y + _ACROSS - 1))
+    cut = box[:, row]
+    cut[0::2] = np.maximum(cut[0::2], ends[0::2])
+    cut[1::2] = np.minimum(cut[1::2], ends[1::2])
+    return Pieces(np.concatenate((near, row)), np.concatenate((box[:, near], cut), axis=1))
+
+
+def _tiles(rows: IntArray, box: Int32Array) -> tuple[IntArray, IntArray, IntArray]:
+    """Row, first column and first row (S,) of all tiles that the pixel boxes (4, R) of rows (R,) touch."""
+    x0, x1, y0, y1 = (box // TILE).astype(np.int64)
     across = x1 - x0 + 1
     owner, rank = segments(np.concatenate(([0], np.cumsum(across * (y1 - y0 + 1)))))
-    x = (x0[owner] + rank % across[owner]) * size
-    y = (y0[owner] + rank // across[owner]) * size
-    return Spans(rows[owner], x, y, np.zeros(owner.size, dtype=np.int64))
+    y, x = np.divmod(rank, across[owner])
+    return rows[owner], (x0[owner] + x) * TILE, (y0[owner] + y) * TILE
 
 
-def _merge(a: Spans, b: Spans) -> Spans:
-    """Both lists as one."""
-    return Spans(
-        np.concatenate((a.row, b.row)),
-        np.concatenate((a.x, b.x)),
-        np.concatenate((a.y, b.y)),
-        np.concatenate((a.crossed, b.crossed)),
-    )
-
-
-def _extremes(plane: FloatArray, spans: Spans, size: int) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest value of each span's plane at the pixels of its tile."""
-    a, b, c = plane[0, spans.row], plane[1, spans.row], plane[2, spans.row]
-    first = a * spans.x + b * spans.y + c
-    reach_x, reach_y = a * (size - 1), b * (size - 1)
+def _extremes(plane: FloatArray, x: IntArray, y: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest values (..., S) of planes (..., 3, S) at the pixels of tiles at x, y (S,)."""
+    a, b, c = plane[..., 0, :], plane[..., 1, :], plane[..., 2, :]
+    first = a * x + b * y + c
+    reach_x, reach_y = a * (TILE - 1), b * (TILE - 1)
     least = first + np.minimum(reach_x, 0) + np.minimum(reach_y, 0)
     greatest = first + np.maximum(reach_x, 0) + np.maximum(reach_y, 0)
     return least, greatest
 
 
-def _classify(planes: Planes, spans: Spans, size: int) -> Spans:
-    """Drop spans that lie outside an edge; note which edges cross the others."""
-    outside = np.zeros(spans.row.size, dtype=np.bool_)
-    crossed = np.zeros(spans.row.size, dtype=np.int64)
-    for k in range(3):
-        least, greatest = _extremes(planes.edge[k], spans, size)
-        outside |= greatest <= 0
-        crossed |= (least <= 0).astype(np.int64) << k
-    found = Spans(spans.row, spans.x, spans.y, crossed)
-    return found.take(np.flatnonzero(~outside))
-
-
-def _hide(planes: Planes, spans: Spans, canvas: Canvas, size: int) -> Spans:
-    """Drop spans that lie wholly behind a surface that covers their tile."""
-    least, greatest = _extremes(planes.inverse, spans, size)
-    low, high = planes.low[spans.row], planes.high[spans.row]
-    least, greatest = np.clip(least, low, high), np.clip(greatest, low, high)
-    place = _places(planes, spans, canvas, size)
+def _behind(planes: Planes, row: IntArray, x: IntArray, y: IntArray, covered: BoolArray) -> BoolArray:
+    """Which pairs lie, in a tile at x, y (S,), wholly behind one that covers it."""
+    least, greatest = _extremes(np.take(planes.inverse, row, axis=1), x, y)
+    low, high = planes.low.take(row), planes.high.take(row)
+    least, greatest = _held(least, low, high), _held(greatest, low, high)
+    per_block = (SIDE // TILE) ** 2
+    place = planes.block.take(row) * np.int64(per_block) + y // TILE * (SIDE // TILE) + x // TILE
     nearest = np.zeros(int(place.max(initial=-1)) + 1)
-    covers = np.flatnonzero((spans.crossed == 0) & ~planes.cut[spans.row])
+    covers = np.flatnonzero(covered & ~planes.cut.take(row))
     np.maximum.at(nearest, place[covers], least[covers])
-    return spans.take(np.flatnonzero(greatest >= nearest[place]))
+    result: BoolArray = greatest < nearest[place]
+    return result
 
 
-def _places(planes: Planes, spans: Spans, canvas: Canvas, size: int) -> IntArray:
-    """A number for every span's tile: the microtile's index in the canvas, or one of the larger tile."""
-    block = planes.block[spans.row]
-    if size == TILE:
-        return block * np.int64((SIDE // TILE) ** 2) + spans.y // TILE * (SIDE // TILE) + spans.x // TILE
-    place: IntArray = canvas.tile_start[block] + (spans.y >> 3) * canvas.tiles_across[block] + (spans.x >> 3)
-    return place
+def _held(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Values of 1/t (S,) held between those of the corners, as they are where they are drawn."""
+    return np.minimum(np.maximum(values, low, out=values), high, out=values)
+
+
+def _spans(planes: Planes, pieces: Pieces, canvas: Canvas) -> Spans:
+    """The microtiles of all pieces that lie on the inner side of some pixel of every edge."""
+    wide = _CLASS_OF[pieces.box[1] - pieces.box[0] + 1]
+    high = _CLASS_OF[pieces.box[3] - pieces.box[2] + 1]
+    classes = (high * len(_SIZES) + wide).astype(np.uint16)
+    order = np.argsort(classes, kind="stable")
+    classes = classes[order]
+    bounds = np.flatnonzero(np.diff(classes, prepend=np.uint16(65535), append=np.uint16(65535)))
+    found = []
+    for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        shape = _SIZES[classes[first] // len(_SIZES)], _SIZES[classes[first] % len(_SIZES)]
+        step = _CELLS // (shape[0] * shape[1])
+        for at in range(first, last, step):
+            part = order[at : min(at + step, last)]
+            found.append(_class_spans(planes, pieces.row[part], pieces.box[:, part], shape, canvas))
+    columns = zip(*([getattr(spans, field.name) for field in fields(Spans)] for spans in found), strict=True)
+    return Spans(*(np.concatenate(column) for column in columns)) if found else _no_spans()
+
+
+def _no_spans() -> Spans:
+    """None at all."""
+    whole, real = np.zeros(0, dtype=np.int64), np.zeros(0)
+    return Spans(whole, whole, whole, whole, np.zeros(0, dtype=np.uint8), real, real)
+
+
+def _class_spans(
+    planes: Planes, row: IntArray, box: IntArray, shape: tuple[int, int], canvas: Canvas
+) -> Spans:
+    """Spans of n pieces that are looked at in this many (rows, columns) of microtiles."""
+    rows, columns = shape
+    x0, x1, y0, y1 = box
+    i, j = np.arange(columns)[:, None], np.arange(rows)[:, None]
+    inside = (j <= y1 - y0)[:, None] & (i <= x1 - x0)
+    crossed = np.zeros((rows, columns, row.size), dtype=np.uint8)
+    for k in range(3):
+        values, down, up = _corner_values(np.take(planes.edge[k], row, axis=1), x0, y0, i, j)
+        inside &= values > -up
+        crossed |= (values <= -down).view(np.uint8) << np.uint8(k)
+    keep = np.flatnonzero(inside)
+    values, down, up = _corner_values(np.take(planes.inverse, row, axis=1), x0, y0, i, j)
+    cell, piece = np.divmod(keep, row.size)
+    row = row.take(piece)
+    values = values.ravel().take(keep)
+    block, low, high = planes.block.take(row), planes.low.take(row), planes.high.take(row)
+    x = x0.take(piece) + cell % columns
+    y = y0.take(piece) + cell // columns
+    return Spans(
+        row=row,
+        tile=canvas.tile_start.take(block) + y * canvas.tiles_across.take(block) + x,
+        x=x * MICROTILE,
+        y=y * MICROTILE,
+        crossed=crossed.ravel().take(keep),
+        least=_held(values + down.take(piece), low, high),
+        greatest=_held(values + up.take(piece), low, high),
+    )
+
+
+def _corner_values(
+    plane: FloatArray, x: IntArray, y: IntArray, i: IntArray, j: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Values of planes (3, n) at the first pixels of microtiles, and how far others go down and up.
+
+    Args:
+        plane: the planes.
+        x: (n,) microtile columns to begin at.
+        y: (n,) microtile rows to begin at.
+        i: (columns, 1) further columns.
+        j: (rows, 1) further rows.
+
+    Returns:
+        values (rows, columns, n); the most that a pixel of a microtile has less (n,), and more (n,).
+    """
+    a, b, c = plane
+    across, below = a * MICROTILE, b * MICROTILE
+    lines = below * (y + j)
+    lines += c
+    values = lines[:, None] + across * (x + i)
+    reach_x, reach_y = a * (MICROTILE - 1), b * (MICROTILE - 1)
+    down = np.minimum(reach_x, 0) + np.minimum(reach_y, 0)
+    up = np.maximum(reach_x, 0) + np.maximum(reach_y, 0)
+    return values, down, up
+
+
+def _visible(planes: Planes, spans: Spans, canvas: Canvas, bits: int) -> Spans:
+    """Without the spans that lie wholly behind what covers their microtile."""
+    nearest = depth_part(canvas.keys.min(axis=1), bits)
+    covers = np.flatnonzero((spans.crossed == 0) & ~planes.cut.take(spans.row))
+    np.maximum.at(nearest, spans.tile[covers], spans.least[covers])
+    return spans.take(np.flatnonzero(spans.greatest >= nearest.take(spans.tile)))
+
+
+def _fill(planes: Planes, spans: Spans, canvas: Canvas) -> Spans:
+    """Note the microtiles that have nothing but one pair that fills them; the spans of all others."""
+    count = np.bincount(spans.tile, minlength=canvas.touched.size)
+    count += canvas.touched
+    alone = (count.take(spans.tile) == 1) & (spans.crossed == 0) & ~planes.cut.take(spans.row)
+    filled = np.flatnonzero(alone)
+    canvas.filler[spans.tile[filled]] = planes.serial.take(spans.row[filled]) + np.int64(1)
+    return spans.take(np.flatnonzero(~alone))
 
 
 def _draw_rounds(
     planes: Planes, spans: Spans, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None
 ) -> None:
     """Evaluate the microtiles' pixels, in rounds in which every microtile occurs once."""
-    tile = _places(planes, spans, canvas, MICROTILE)
-    order = np.argsort(tile, kind="stable")
-    tile = tile[order]
-    fresh = np.flatnonzero(np.diff(tile, prepend=-1))
-    rank = np.arange(tile.size) - np.repeat(fresh, np.diff(fresh, append=tile.size))
-    # Few spans are left after the first rounds: there one evaluation for all costs less than several.
-    crossed = spans.crossed[order]
-    kind = np.where(rank < _EARLY, crossed, np.minimum(crossed, 1))
-    by_round = np.lexsort((kind, rank))
-    tile, group = tile[by_round], (rank * 8 + kind)[by_round]
-    stack = _stack(planes, spans.take(order[by_round]))
-    keys = canvas.keys.reshape(-1, 64)
+    canvas.touched[spans.tile] = True
+    group, order = _rounds(spans)
+    spans = spans.take(order)
     bounds = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
     for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
         for at in range(first, last, _ROUND):
-            part = slice(at, min(at + _ROUND, last))
-            place = tile[part]
-            keys[place] = np.maximum(keys[place], _tile_keys(stack, part, limits, bits, by))
+            part = np.arange(at, min(at + _ROUND, last))
+            few = spans.take(part)
+            keys = canvas.keys.take(few.tile, axis=0)
+            canvas.keys[few.tile] = np.maximum(keys, _tile_keys(planes, few, limits, bits, by), out=keys)
 
 
-@dataclass(frozen=True)
-class _Stack:
-    """What S microtiles need to be evaluated, in the order of the rounds.
+def _rounds(spans: Spans) -> tuple[IntArray, IntArray]:
+    """Numbers of groups (S,) to be evaluated together, ascending, and the spans in their order (S,).
 
-    Attributes:
-        local: (4, S, 3) planes of the three edges and of 1/t, from the microtile's first pixel.
-        low: (S, 1) least 1/t.
-        high: (S, 1) greatest 1/t.
-        serial: (S, 1) serial of the pair.
-        cut: (S, 1) pairs that reach beyond near or far.
-        block: (S, 1) place of the block in the batch.
-        spans: the microtiles.
+    In a group no microtile comes twice, and, but for the late rounds, the same edges cross all: few
+    spans are left then, and one evaluation for all costs less than several.
     """
-
-    local: FloatArray
-    low: FloatArray
-    high: FloatArray
-    serial: Int32Array
-    cut: BoolArray
-    block: Int32Array
-    spans: Spans
-
-
-def _stack(planes: Planes, spans: Spans) -> _Stack:
-    """Gather what the spans need, once for all rounds."""
-    row = spans.row
-    local = np.empty((4, row.size, 3))
-    for k, plane in enumerate((*planes.edge, planes.inverse)):
-        a, b = plane[0, row], plane[1, row]
-        local[k, :, 0], local[k, :, 1] = a, b
-        local[k, :, 2] = a * spans.x + b * spans.y + plane[2, row]
-    column = row[:, None]
-    return _Stack(
-        local=local,
-        low=planes.low[column],
-        high=planes.high[column],
-        serial=planes.serial[column],
-        cut=planes.cut[column],
-        block=planes.block[column],
-        spans=spans,
-    )
+    by_tile = _sorted_order(spans.tile)
+    tile = spans.tile[by_tile]
+    fresh = np.flatnonzero(np.diff(tile, prepend=-1))
+    rank = np.arange(tile.size) - np.repeat(fresh, np.diff(fresh, append=tile.size))
+    crossed = spans.crossed[by_tile].astype(np.int64)
+    group = rank * 8 + np.where(rank < _EARLY, crossed, np.minimum(crossed, 1))
+    by_group = _sorted_order(group)
+    return group[by_group], by_tile[by_group]
 
 
-def _tile_keys(stack: _Stack, part: slice, limits: DepthRange, bits: int, by: BatchOrder | None) -> IntArray:
-    """Keys (S, 64) of a slice of microtiles; negative where they are not covered."""
-    # Exact whatever the order of the sums: the planes lie on dyadic grids.
-    inverse: FloatArray = stack.local[3, part] @ _BASIS
-    np.maximum(inverse, stack.low[part], out=inverse)
-    np.minimum(inverse, stack.high[part], out=inverse)
-    crossed = int(np.bitwise_or.reduce(stack.spans.crossed[part]))
-    inside = None
-    for k in range(3):
-        if crossed >> k & 1:
-            edge = stack.local[k, part] @ _BASIS
-            inside = edge if inside is None else np.minimum(inside, edge, out=inside)
-    x, y, cut = stack.spans.x[part, None] + _X, stack.spans.y[part, None] + _Y, stack.cut[part]
+def _sorted_order(values: IntArray) -> IntArray:
+    """The order (S,) that sorts small whole numbers; equal ones stay as they are."""
+    packed = values << 32 | np.arange(values.size)
+    packed.sort()
+    packed &= 0xFFFFFFFF
+    return packed
+
+
+def _tile_keys(
+    planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None
+) -> IntArray:
+    """Keys (S, 64) of some microtiles; negative where they are not covered."""
+    row, x, y = spans.row, spans.x, spans.y
+    crossed = int(np.bitwise_or.reduce(spans.crossed))
+
+    def values(plane: FloatArray) -> FloatArray:
+        # Exact whatever the order of the sums: the planes lie on dyadic grids.
+        local = np.take(plane, row, axis=1)
+        local[2] += local[0] * x + local[1] * y
+        result: FloatArray = local.T.copy() @ BASIS
+        return result
+
+    inverse = values(planes.inverse)
+    np.maximum(inverse, planes.low.take(row)[:, None], out=inverse)
+    np.minimum(inverse, planes.high.take(row)[:, None], out=inverse)
+    edges = [values(planes.edge[k]) for k in range(3) if crossed >> k & 1]
+    for other in edges[1:]:
+        np.minimum(edges[0], other, out=edges[0])
+    cut = planes.cut.take(row)
     if cut.any():
-        kept = limits.keeps(stack.block[part], x, y, inverse)
-        np.negative(inverse, out=inverse, where=~kept & cut)
-    if inside is not None:
-        np.negative(inverse, out=inverse, where=(inside < 0) & (inverse > 0))
+        kept = limits.keeps(planes.block.take(row)[:, None], x[:, None] + _X, y[:, None] + _Y, inverse)
+        np.negative(inverse, out=inverse, where=~kept & cut[:, None])
+    if edges:
+        np.copysign(inverse, np.minimum(inverse, edges[0], out=edges[0]), out=inverse)
     if by is not None:
-        inverse = by.values(stack.block[part], x, y, inverse)
-    return make_keys(inverse, serial_part(stack.serial[part], bits), bits)
+        inverse = by.values(planes.block.take(row)[:, None], x[:, None] + _X, y[:, None] + _Y, inverse)
+    return make_keys(inverse, serial_part(planes.serial.take(row), bits)[:, None], bits)

@@ -9,10 +9,11 @@ then decide every pixel alike, and every machine computes the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
 
@@ -24,8 +25,40 @@ _TINY = 1e-300
 
 
 @dataclass(frozen=True)
+class Warped:
+    """N block pairs in the homogeneous pixels of their blocks.
+
+    Attributes:
+        triangle: (N,) triangle index.
+        block: (N,) place of the block in the batch.
+        serial: (N,) rank of the pair by (block, triangle); the lower wins equal depths.
+        corners: (3, 3, N) homogeneous pixels [corner, X/Y/W].
+        box: (4, N) first and last pixel column, first and last row of the bounding box.
+        cut: (N,) triangles that reach beyond the near or far depth.
+    """
+
+    triangle: Int32Array
+    block: Int32Array
+    serial: Int32Array
+    corners: FloatArray
+    box: Int32Array
+    cut: BoolArray
+
+    def take(self, rows: IntArray) -> Warped:
+        """The pairs with these indices, in their order."""
+        return Warped(
+            triangle=self.triangle.take(rows),
+            block=self.block.take(rows),
+            serial=self.serial.take(rows),
+            corners=np.take(self.corners, rows, axis=2),
+            box=np.take(self.box, rows, axis=1),
+            cut=self.cut.take(rows),
+        )
+
+
+@dataclass(frozen=True)
 class Planes:
-    """N block pairs ready to be drawn; plane coefficients (a, b, c) come first.
+    """N block pairs ready to be drawn; plane coefficients (a, b, c) come before the pairs.
 
     Attributes:
         triangle: (N,) triangle index.
@@ -33,6 +66,7 @@ class Planes:
         serial: (N,) rank of the pair by (block, triangle); the lower wins equal depths.
         edge: (3, 3, N) edge functions [edge, coefficient], positive inside, never 0 at a pixel.
         inverse: (3, N) plane of 1/t.
+        turn: (N,) sign that the edge functions were multiplied by to be positive inside.
         low: (N,) least 1/t of the triangle's corners; a bound that slivers are held to.
         high: (N,) greatest 1/t of the corners.
         box: (4, N) first and last pixel column, first and last row of the bounding box.
@@ -44,30 +78,60 @@ class Planes:
     serial: Int32Array
     edge: FloatArray
     inverse: FloatArray
+    turn: FloatArray
     low: FloatArray
     high: FloatArray
     box: Int32Array
     cut: BoolArray
 
-    def take(self, rows: IntArray) -> Planes:
-        """The block pairs with these indices, in their order."""
+    def __getitem__(self, part: slice) -> Planes:
+        """A range of the pairs, as views."""
         return Planes(
-            triangle=self.triangle[rows],
-            block=self.block[rows],
-            serial=self.serial[rows],
-            edge=np.take(self.edge, rows, axis=2),
-            inverse=np.take(self.inverse, rows, axis=1),
-            low=self.low[rows],
-            high=self.high[rows],
-            box=np.take(self.box, rows, axis=1),
-            cut=self.cut[rows],
+            self.triangle[part],
+            self.block[part],
+            self.serial[part],
+            self.edge[:, :, part],
+            self.inverse[:, part],
+            self.turn[part],
+            self.low[part],
+            self.high[part],
+            self.box[:, part],
+            self.cut[part],
         )
 
 
-def joined(parts: Sequence[Planes]) -> Planes:
-    """Several lists of pairs as one, in their order."""
-    columns = {field.name: [getattr(part, field.name) for part in parts] for field in fields(Planes)}
-    return Planes(**{name: np.concatenate(arrays, axis=-1) for name, arrays in columns.items()})
+class PlaneTable:
+    """Memory for the planes of a batch, filled as its pairs are drawn and read when all are."""
+
+    def __init__(self, capacity: int) -> None:
+        self.filled = 0
+        self._all = Planes(
+            triangle=np.empty(capacity, dtype=np.int32),
+            block=np.empty(capacity, dtype=np.int32),
+            serial=np.empty(capacity, dtype=np.int32),
+            edge=np.empty((3, 3, capacity)),
+            inverse=np.empty((3, capacity)),
+            turn=np.empty(capacity),
+            low=np.empty(capacity),
+            high=np.empty(capacity),
+            box=np.empty((4, capacity), dtype=np.int32),
+            cut=np.empty(capacity, dtype=np.bool_),
+        )
+
+    @property
+    def planes(self) -> Planes:
+        """All planes so far."""
+        return self._all[: self.filled]
+
+    def add(self, pairs: Warped) -> Planes:
+        """Set up these pairs in the table's next rows; a triangle seen edge-on covers nothing."""
+        rows = self._all[self.filled : self.filled + pairs.triangle.size]
+        self.filled += pairs.triangle.size
+        rows.triangle[:], rows.block[:], rows.serial[:] = pairs.triangle, pairs.block, pairs.serial
+        rows.box[:], rows.cut[:] = pairs.box, pairs.cut
+        edge_planes(pairs.corners, rows.edge, rows.inverse, rows.turn)
+        rows.low[:], rows.high[:] = depth_bounds(pairs.corners[:, 2])
+        return rows
 
 
 def project(corners: FloatArray, matrix: FloatArray) -> FloatArray:
@@ -81,106 +145,132 @@ def project(corners: FloatArray, matrix: FloatArray) -> FloatArray:
         (3, 3, N) [corner, X/Y/W].
     """
     result = np.empty_like(corners)
-    for corner in range(3):
-        x, y, z = corners[corner]
-        for row in range(3):
-            m = matrix[row]
-            result[corner, row] = m[0] * x + m[1] * y + m[2] * z
+    x, y, z = corners[:, 0], corners[:, 1], corners[:, 2]
+    part = np.empty_like(x)
+    for row in range(3):
+        total = result[:, row]
+        np.multiply(matrix[row, 0], x, out=total)
+        total += np.multiply(matrix[row, 1], y, out=part)
+        total += np.multiply(matrix[row, 2], z, out=part)
     return result
 
 
 def gather_corners(vertices: FloatArray, triangles: Int32Array) -> FloatArray:
     """Corners (3, 3, N) [corner, axis] of `triangles` (N, 3), contiguous along N."""
-    return np.ascontiguousarray(vertices[triangles].transpose(1, 2, 0))
+    rows = vertices.take(triangles.T.ravel(), axis=0).reshape(3, -1, 3)
+    return np.ascontiguousarray(rows.transpose(0, 2, 1))
 
 
-def pixel_boxes(homogeneous: FloatArray, width: IntArray, height: IntArray) -> Int32Array:
+def pixel_boxes(
+    homogeneous: FloatArray, width: IntArray | FloatArray, height: IntArray | FloatArray
+) -> Int32Array:
     """Bounding boxes (4, N) first/last column, first/last row of the pixels a triangle may cover.
 
     A triangle that reaches behind the eye may cover all of the block; one wholly behind it, or
     beside the block, has an empty box (last < first).
     """
     w = homogeneous[:, 2]
-    front = w.min(axis=0) > _TINY
-    behind = w.max(axis=0) <= 0
-    safe = np.where(w > _TINY, w, 1.0)
+    least, greatest = _extremes(w)
+    front = least > _TINY
+    all_front = bool(front.all())
+    scale = np.reciprocal(w if all_front else np.where(w > _TINY, w, 1.0))
     box = np.empty((4, w.shape[1]), dtype=np.int32)
     for axis, extent in ((0, width), (1, height)):
-        at = homogeneous[:, axis] / safe
-        first = np.where(front, np.ceil(at.min(axis=0) - 1e-6), 0.0)
-        last = np.where(front, np.floor(at.max(axis=0) + 1e-6), extent - 1.0)
-        last[behind] = -1.0
-        box[2 * axis] = np.clip(first, 0, extent)
-        box[2 * axis + 1] = np.clip(last, -1, extent - 1)
+        first, last = _extremes(homogeneous[:, axis] * scale)
+        np.ceil(np.subtract(first, 1e-6, out=first), out=first)
+        np.floor(np.add(last, 1e-6, out=last), out=last)
+        if not all_front:
+            first = np.where(front, first, 0.0)
+            last = np.where(front, last, np.where(greatest > 0, extent - 1.0, -1.0))
+        box[2 * axis] = np.minimum(np.maximum(first, 0.0, out=first), extent, out=first)
+        box[2 * axis + 1] = np.minimum(np.maximum(last, -1.0, out=last), extent - 1, out=last)
     return box
 
 
-def edge_planes(homogeneous: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _extremes(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest (N,) of three values (3, N)."""
+    a, b, c = values
+    least, greatest = np.minimum(a, b), np.maximum(a, b)
+    return np.minimum(least, c, out=least), np.maximum(greatest, c, out=greatest)
+
+
+def edge_planes(homogeneous: FloatArray, edge: FloatArray, inverse: FloatArray, turn: FloatArray) -> None:
     """Edge functions and inverse depth of triangles in homogeneous pixels.
 
     Args:
         homogeneous: (3, 3, N) [corner, X/Y/W].
-
-    Returns:
-        edge (3, 3, N) [edge, coefficient], edge k opposite to corner k, positive inside;
-        inverse (3, N) plane of 1/t; determinant (N,), 0 for a triangle seen edge-on.
+        edge: (3, 3, N) is given the edge functions [edge, coefficient], edge k opposite to corner k,
+            positive inside; all zero for a triangle seen edge-on.
+        inverse: (3, N) is given the plane of 1/t.
+        turn: (N,) is given the sign of the determinant, by which the edge functions were multiplied.
     """
     p, q, r = homogeneous
-    normal = _cross(q - p, r - p)
-    determinant = p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2]
-    sign = np.sign(determinant)
-    edge = np.stack((_cross(q, r), _cross(r, p), _cross(p, q))) * sign
-    for k in range(3):
-        _snap_edge(edge[k])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = normal / determinant
-    inverse[:, determinant == 0] = 0
+    _cross(q - p, r - p, inverse)
+    determinant = p[0] * inverse[0]
+    determinant += p[1] * inverse[1]
+    determinant += p[2] * inverse[2]
+    np.sign(determinant, out=turn)
+    for k, (start, end) in enumerate(((q, r), (r, p), (p, q))):
+        _cross(start, end, edge[k])
+    edge *= turn
+    snap_edges(edge)
+    determinant[turn == 0] = 1.0
+    inverse /= determinant
     # Depth is measured at the place itself; only what covers it is decided on the shifted lattice.
     inverse[2] -= LATTICE[0] * inverse[0] + LATTICE[1] * inverse[1]
     _snap_inverse(inverse)
-    return edge, inverse, determinant
 
 
 def depth_bounds(w: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Least and greatest 1/t (N,) of triangles whose corners have these W (3, N)."""
-    front = w.min(axis=0) > _TINY
-    safe = np.maximum(w, _TINY)
-    low = np.where(front, 1.0 / safe.max(axis=0), _TINY)
-    high = np.where(front, 1.0 / safe.min(axis=0), 1.0 / _TINY)
+    least, greatest = _extremes(w)
+    front = least > _TINY
+    if front.all():
+        return np.reciprocal(greatest), np.reciprocal(least)
+    low = np.where(front, 1.0 / np.maximum(greatest, _TINY), _TINY)
+    high = np.where(front, 1.0 / np.maximum(least, _TINY), 1.0 / _TINY)
     return low, high
 
 
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+def _cross(a: FloatArray, b: FloatArray, result: FloatArray) -> None:
     """Cross product along the first axis; trading `a` and `b` negates it exactly."""
-    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
+    part = np.empty_like(result[0])
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        np.multiply(a[i], b[j], out=result[k])
+        result[k] -= np.multiply(a[j], b[i], out=part)
 
 
-def _power_of_two(x: FloatArray) -> FloatArray:
+def power_of_two(x: NDArray[Any]) -> FloatArray:
     """The largest power of two not above `x` > 0; 0 for 0."""
-    return (x.view(np.int64) & _EXPONENT).view(np.float64)
+    result: FloatArray = (x.view(np.int64) & _EXPONENT).view(np.float64)
+    return result
 
 
-def _snap_edge(plane: FloatArray) -> None:
-    """Put an edge plane (3, N) on its dyadic grid and fold the tie rule into c, in place.
+def snap_edges(edge: FloatArray) -> None:
+    """Put edge planes (..., 3, N) on their dyadic grids and fold the tie rule into c, in place.
 
     The grid's step is 2⁻³⁴ of the larger slope, so sums over pixels below 2¹³ are exact. The half
     step added to c settles pixels exactly on the edge by the signs of a and b (a top-left rule);
     the neighbour's negated plane gets the negated half step.
     """
-    a, b, c = plane
-    scale = _power_of_two(np.maximum(np.abs(a), np.abs(b)))
-    round_to = scale * (1.5 * 2.0**18)
-    for coefficient in (a, b, c):
-        coefficient += round_to
-        coefficient -= round_to
-    c += np.copysign(scale * 2.0**-35, a + b * 2.0**-44)
+    a, b, c = edge[..., 0, :], edge[..., 1, :], edge[..., 2, :]
+    scale = power_of_two(np.maximum(np.abs(a), np.abs(b)))
+    round_to = (scale * (1.5 * 2.0**18))[..., None, :]
+    edge += round_to
+    edge -= round_to
+    tie = b * 2.0**-44
+    tie += a
+    scale *= 2.0**-35
+    c += np.copysign(scale, tie, out=tie)
 
 
 def _snap_inverse(plane: FloatArray) -> None:
     """Put a plane of 1/t (3, N) on a grid on which sums over a block are exact, in place."""
     a, b, c = plane
-    scale = _power_of_two(np.maximum(np.maximum(np.abs(a), np.abs(b)) * 512.0, np.abs(c)))
-    round_to = scale * (1.5 * 2.0**3)
-    for coefficient in (a, b, c):
-        coefficient += round_to
-        coefficient -= round_to
+    slope = np.maximum(np.abs(a), np.abs(b))
+    slope *= 512.0
+    scale = power_of_two(np.maximum(slope, np.abs(c), out=slope))
+    scale *= 1.5 * 2.0**3
+    plane += scale
+    plane -= scale

@@ -1,4 +1,4 @@
-"""Prewarp: the pairs of binning become block pairs, and those become planes.
+"""Prewarp: the pairs of binning become block pairs, and those get a place among the pixels.
 
 The vertices of a facet's triangles are carried through the facet's own matrix into homogeneous
 pixels, which is the paper's prewarping (§3.2.2): from here on the whole quilt is one raster.
@@ -14,17 +14,9 @@ from quiltcli.binning import Pairs
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
 from quiltcli.homography import QuiltRays
 from quiltcli.raster.blocks import SIDE, Blocks
-from quiltcli.raster.planes import (
-    LATTICE,
-    Planes,
-    depth_bounds,
-    edge_planes,
-    gather_corners,
-    pixel_boxes,
-    project,
-)
+from quiltcli.raster.planes import LATTICE, Warped, gather_corners, pixel_boxes, project
 
-_CHUNK = 1 << 14
+_CHUNK = 1 << 13
 
 
 @dataclass(frozen=True)
@@ -113,14 +105,14 @@ def _blocks_under(
     return first[owner] + row * blocks.columns[facet[owner]] + column, owner
 
 
-def make_planes(
+def warp(
     sight: Sight,
     block_pairs: BlockPairs,
     blocks: Blocks,
     block: IntArray,
     matrices: FloatArray,
-) -> list[Planes]:
-    """Planes of all pairs of some blocks that can have fragments, in chunks that fit the cache.
+) -> Warped:
+    """The pairs of some blocks in homogeneous pixels, without those whose boxes hold no pixel.
 
     Args:
         sight: the scene from the eye.
@@ -131,45 +123,37 @@ def make_planes(
     """
     counts = block_pairs.start[block + 1] - block_pairs.start[block]
     place, rank = segments(np.concatenate(([0], np.cumsum(counts))))
-    source = block_pairs.start[block][place] + rank
-    chunks = []
-    for at in range(0, source.size, _CHUNK):
-        part = slice(at, at + _CHUNK)
-        chunk = _plane_chunk(
-            sight, block_pairs.triangle[source[part]], place[part], at, blocks, block, matrices
-        )
-        if chunk.triangle.size:
-            chunks.append(chunk)
-    return chunks
-
-
-def _plane_chunk(
-    sight: Sight,
-    triangle: Int32Array,
-    place: IntArray,
-    first_serial: int,
-    blocks: Blocks,
-    block: IntArray,
-    matrices: FloatArray,
-) -> Planes:
-    """Planes of the pairs of one chunk, without those that cover no pixel."""
-    corners = gather_corners(sight.vertices, sight.triangles[triangle])
-    homogeneous = project(corners, np.ascontiguousarray(matrices[place].transpose(1, 2, 0)))
-    box = pixel_boxes(homogeneous, blocks.width[block][place], blocks.height[block][place])
-    alive = np.flatnonzero((box[0] <= box[1]) & (box[2] <= box[3]))
-    homogeneous = np.take(homogeneous, alive, axis=2)
-    edge, inverse, determinant = edge_planes(homogeneous)
-    low, high = depth_bounds(homogeneous[:, 2])
-    planes = Planes(
-        triangle=triangle[alive],
-        block=place[alive].astype(np.int32),
-        serial=(alive + first_serial).astype(np.int32),
-        edge=edge,
-        inverse=inverse,
-        low=low,
-        high=high,
-        box=np.take(box, alive, axis=1),
-        cut=sight.cut[triangle[alive]],
+    triangle = block_pairs.triangle.take(block_pairs.start[block].take(place) + rank)
+    matrices = np.ascontiguousarray(matrices.transpose(1, 2, 0))
+    extent = blocks.width[block].astype(np.float64), blocks.height[block].astype(np.float64)
+    room = Warped(
+        triangle=np.empty(place.size, dtype=np.int32),
+        block=np.empty(place.size, dtype=np.int32),
+        serial=np.empty(place.size, dtype=np.int32),
+        corners=np.empty((3, 3, place.size)),
+        box=np.empty((4, place.size), dtype=np.int32),
+        cut=np.empty(place.size, dtype=np.bool_),
     )
-    solid = np.flatnonzero(determinant)
-    return planes if solid.size == alive.size else planes.take(solid)
+    filled = 0
+    for at in range(0, place.size, _CHUNK):
+        part = slice(at, at + _CHUNK)
+        corners = gather_corners(sight.vertices, sight.triangles.take(triangle[part], axis=0))
+        homogeneous = project(corners, np.take(matrices, place[part], axis=2))
+        box = pixel_boxes(homogeneous, *(size.take(place[part]) for size in extent))
+        alive = np.flatnonzero((box[0] <= box[1]) & (box[2] <= box[3]))
+        rows = slice(filled, filled + alive.size)
+        room.triangle[rows] = triangle[part].take(alive)
+        room.block[rows] = place[part].take(alive)
+        room.serial[rows] = alive + at
+        room.corners[:, :, rows] = np.take(homogeneous, alive, axis=2)
+        room.box[:, rows] = np.take(box, alive, axis=1)
+        filled = rows.stop
+    np.take(sight.cut, room.triangle[:filled], out=room.cut[:filled], mode="clip")
+    return Warped(
+        room.triangle[:filled],
+        room.block[:filled],
+        room.serial[:filled],
+        room.corners[:, :, :filled],
+        room.box[:, :filled],
+        room.cut[:filled],
+    )

@@ -2,6 +2,8 @@
 
 Triangles are sorted into classes of box sizes; inside a class all boxes have one shape, so the edge
 functions of thousands of triangles are evaluated by a few broadcasts over (rows, columns, triangles).
+Those that face the eye come first. Most of the others lie behind them, which one look at the
+microtiles under their boxes tells, before their planes are made.
 """
 
 from __future__ import annotations
@@ -11,30 +13,51 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
+from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.raster.blocks import Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.keys import make_keys, serial_part
 from quiltcli.raster.order import BatchOrder
-from quiltcli.raster.planes import Planes
+from quiltcli.raster.planes import Planes, PlaneTable, Warped, depth_bounds
 
 SIZES = (1, 2, 3, 4, 6, 8, 12)
 LIMIT = SIZES[-1]
+_RUN = 1 << 12
 _CANDIDATES = 1 << 15
+_SHAPES = len(SIZES) ** 2
 _CLASS_OF = np.searchsorted(np.asarray(SIZES), np.arange(LIMIT + 1)).astype(np.uint16)
 
 
-def size_classes(box: Int32Array, cut: BoolArray) -> NDArray[np.uint16]:
-    """Class (N,) of every box (4, N): its shape, and whether depth must be tested; boxes ≤ LIMIT only."""
-    width = box[1] - box[0] + 1
-    height = box[3] - box[2] + 1
-    classes: NDArray[np.uint16] = (_CLASS_OF[height] * len(SIZES) + _CLASS_OF[width]) * 2 + cut
+def size_classes(pairs: Warped) -> NDArray[np.uint16]:
+    """Class (N,) of every box: its shape, and whether depth must be tested; boxes ≤ LIMIT only."""
+    first_x, last_x, first_y, last_y = pairs.box
+    width, height = last_x - first_x + 1, last_y - first_y + 1
+    classes: NDArray[np.uint16] = _CLASS_OF[height] * np.uint16(len(SIZES)) + _CLASS_OF[width]
+    classes += pairs.cut * np.uint16(_SHAPES)
     return classes
 
 
+def seen_from_behind(pairs: Warped, handed: FloatArray) -> BoolArray:
+    """Pairs (N,) whose winding the eye sees clockwise; never those that reach behind the eye.
+
+    Only the order of drawing depends on it, so corners may be rounded.
+
+    Args:
+        pairs: pairs in homogeneous pixels.
+        handed: (K,) sign of the determinant of every block's matrix.
+    """
+    x, y, w = pairs.corners.transpose(1, 0, 2)
+    front = w.min(axis=0) > 0
+    scale = np.reciprocal(np.where(front, w, 1.0))
+    x, y = x * scale, y * scale
+    area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
+    result: BoolArray = front & (area * handed.take(pairs.block) > 0)
+    return result
+
+
 def draw_small(
-    planes: Planes,
-    rows: IntArray,
+    pairs: Warped,
+    table: PlaneTable,
     canvas: Canvas,
     limits: DepthRange,
     bits: int,
@@ -43,8 +66,8 @@ def draw_small(
     """Draw pairs whose boxes are at most LIMIT pixels wide and high.
 
     Args:
-        planes: pairs.
-        rows: those to draw.
+        pairs: the pairs.
+        table: is given their planes.
         canvas: its keys are raised to the nearest surface.
         limits: near and far, for pairs that reach beyond them.
         bits: bits of the serial in a key.
@@ -53,17 +76,21 @@ def draw_small(
     Returns:
         Number of candidate pixels that were evaluated.
     """
-    classes = size_classes(planes.box[:, rows], planes.cut[rows])
-    order = np.argsort(classes, kind="stable")
-    classes, planes = classes[order], planes.take(rows[order])
-    bounds = np.flatnonzero(np.diff(classes, prepend=np.uint16(65535), append=np.uint16(65535)))
+    classes = size_classes(pairs)
+    behind = seen_from_behind(pairs, limits.handed)
+    order = np.argsort(classes + behind * np.uint16(2 * _SHAPES), kind="stable")
+    turn = order.size - int(np.count_nonzero(behind))
     candidates = 0
-    for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-        shape, cut = divmod(int(classes[first]), 2)
-        height, width = SIZES[shape // len(SIZES)], SIZES[shape % len(SIZES)]
-        candidates += (last - first) * width * height
-        for part in _slices(first, last, _CANDIDATES // (width * height)):
-            _draw_boxes(planes, part, (height, width), canvas, limits if cut else None, bits, by)
+    for part in _slices(0, turn, _RUN):
+        candidates += _draw_run(
+            table.add(pairs.take(order[part])), classes[order[part]], canvas, limits, bits, by
+        )
+    nearest = canvas.keys.min(axis=1) if by is None and turn < order.size else None
+    for part in _slices(turn, order.size, _RUN):
+        run = order[part]
+        if nearest is not None:
+            run = run[~_hidden(pairs, run, nearest, canvas, bits)]
+        candidates += _draw_run(table.add(pairs.take(run)), classes[run], canvas, limits, bits, by)
     return candidates
 
 
@@ -73,9 +100,51 @@ def _slices(first: int, last: int, step: int) -> Iterator[slice]:
         yield slice(at, min(at + step, last))
 
 
+def _hidden(pairs: Warped, rows: IntArray, nearest: IntArray, canvas: Canvas, bits: int) -> BoolArray:
+    """Which pairs (R,) lie behind everything that is drawn in the microtiles under their boxes.
+
+    Args:
+        pairs: the pairs.
+        rows: those asked about.
+        nearest: (M,) least key of every microtile.
+        canvas: the microtiles.
+        bits: bits of the serial in a key.
+    """
+    block = pairs.block.take(rows)
+    x0, x1, y0, y1 = (np.take(pairs.box, rows, axis=1) >> 3).astype(np.int64)
+    across, start = canvas.tiles_across.take(block), canvas.tile_start.take(block)
+    _, high = depth_bounds(np.take(pairs.corners[:, 2], rows, axis=1))
+    front = high.view(np.int64) | np.int64((1 << bits) - 1)
+    upper, lower = start + y0 * across, start + y1 * across
+    least = np.minimum(nearest.take(upper + x0), nearest.take(upper + x1))
+    np.minimum(least, nearest.take(lower + x0), out=least)
+    np.minimum(least, nearest.take(lower + x1), out=least)
+    result: BoolArray = (front < least) & (x1 - x0 < 2) & (y1 - y0 < 2)
+    return result
+
+
+def _draw_run(
+    planes: Planes,
+    classes: NDArray[np.uint16],
+    canvas: Canvas,
+    limits: DepthRange,
+    bits: int,
+    by: BatchOrder | None,
+) -> int:
+    """Draw pairs sorted by class (N,); the number of candidate pixels."""
+    bounds = np.flatnonzero(np.diff(classes, prepend=np.uint16(65535), append=np.uint16(65535)))
+    candidates = 0
+    for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        cut, shape = divmod(int(classes[first]), _SHAPES)
+        height, width = SIZES[shape // len(SIZES)], SIZES[shape % len(SIZES)]
+        candidates += (last - first) * width * height
+        for part in _slices(first, last, _CANDIDATES // (width * height)):
+            _draw_boxes(planes[part], (height, width), canvas, limits if cut else None, bits, by)
+    return candidates
+
+
 def _draw_boxes(
     planes: Planes,
-    part: slice,
     shape: tuple[int, int],
     canvas: Canvas,
     limits: DepthRange | None,
@@ -84,18 +153,18 @@ def _draw_boxes(
 ) -> None:
     """Draw pairs whose boxes all have this (height, width)."""
     height, width = shape
-    block = planes.block[part]
-    across = canvas.tiles_across[block]
-    down = np.diff(canvas.tile_start)[block] // across
-    x = np.minimum(planes.box[0, part], across * 8 - width) + np.arange(width)[:, None]
-    y = np.minimum(planes.box[2, part], down * 8 - height) + np.arange(height)[:, None]
+    block = planes.block
+    across, down = canvas.tiles_across.take(block), canvas.tiles_down.take(block)
+    # A box smaller than its class is widened, to the left or up at the block's far edges.
+    x = np.minimum(planes.box[0], across * 8 - width) + np.arange(width)[:, None]
+    y = np.minimum(planes.box[2], down * 8 - height) + np.arange(height)[:, None]
     fx, fy = x.astype(np.float64), y.astype(np.float64)
-    inside = _evaluate(planes.edge[0, :, part], fx, fy)
+    inside = _evaluate(planes.edge[0], fx, fy)
     for k in (1, 2):
-        np.minimum(inside, _evaluate(planes.edge[k, :, part], fx, fy), out=inside)
-    inverse = _evaluate(planes.inverse[:, part], fx, fy)
-    np.maximum(inverse, planes.low[part], out=inverse)
-    np.minimum(inverse, planes.high[part], out=inverse)
+        np.minimum(inside, _evaluate(planes.edge[k], fx, fy), out=inside)
+    inverse = _evaluate(planes.inverse, fx, fy)
+    np.maximum(inverse, planes.low, out=inverse)
+    np.minimum(inverse, planes.high, out=inverse)
     covered = inside > 0
     if limits is not None:
         covered &= limits.keeps(block, fx[None, :, :], fy[:, None, :], inverse)
@@ -103,10 +172,11 @@ def _draw_boxes(
     if by is not None:
         inverse = by.values(block, fx[None, :, :], fy[:, None, :], inverse)
     column = x + (x >> 3) * 56
-    row = (y >> 3) * (across * 64) + (y & 7) * 8 + canvas.tile_start[block] * 64
-    address = row[:, None, :] + column
-    keys = make_keys(inverse, serial_part(planes.serial[part], bits), bits)
-    np.maximum.at(canvas.keys, address.ravel().take(drawn), keys.ravel().take(drawn))
+    row = (y >> 3) * (across * 64) + (y & 7) * 8 + canvas.tile_start.take(block) * 64
+    address = (row[:, None, :] + column).ravel().take(drawn)
+    keys = make_keys(inverse, serial_part(planes.serial, bits), bits).ravel().take(drawn)
+    np.maximum.at(canvas.keys.reshape(-1), address, keys)
+    canvas.touched[address >> 6] = True
 
 
 def _evaluate(plane: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:

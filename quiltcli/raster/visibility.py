@@ -1,7 +1,8 @@
-"""From depth keys to what each pixel sees.
+"""From a drawn canvas to what each pixel sees.
 
 A microtile that one triangle fills inside a facet is read as a whole: its planes are looked up once
-and evaluated over 64 pixels by broadcasting. Only the pixels of the others are read one by one.
+and evaluated over 64 pixels. The pixels of the others are read one by one; where all 64 see
+something, they are handed on in runs of neighbours all the same, for those are stored fastest.
 """
 
 from __future__ import annotations
@@ -13,208 +14,283 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, OwnerArray, segments
 from quiltcli.raster.blocks import Blocks, Canvas
-from quiltcli.raster.hits import Hits
-from quiltcli.raster.keys import serial_of
+from quiltcli.raster.depth import DepthRange
+from quiltcli.raster.hits import BASIS, RUN, Hits, Wanted, exact_values, vector_values
+from quiltcli.raster.keys import serial_of, serial_part
 from quiltcli.raster.planes import Planes
+from quiltcli.raster.surfaces import surfaces
 
-_CHUNK = 1 << 14
-_EIGHT: FloatArray = np.arange(8.0)[:, None]
-_DX: IntArray = np.tile(np.arange(8), 8)[:, None]
-_DY: IntArray = np.repeat(np.arange(8), 8)[:, None]
+_TILES = 1024
+_DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
+_SOME_DEPTH = np.int64(1) << 62
 
 
 @dataclass(frozen=True)
-class _Tiles:
-    """Where the M microtiles of a canvas lie.
+class Tiles:
+    """Where n microtiles lie.
 
     Attributes:
-        place: (M,) place of the block in the batch.
-        x: (M,) first column in the block.
-        y: (M,) first row in the block.
-        address: (M,) quilt address of the first pixel.
-        stride: (M,) pixels from one row of the page to the next.
-        facet: (M,) facet index.
-        width: (M,) columns of the block.
-        height: (M,) rows of the block.
+        index: (n,) their index in the canvas.
+        block: (n,) place of the block in the batch.
+        x: (n,) first column in the block.
+        y: (n,) first row in the block.
+        address: (n,) quilt address of the first pixel.
+        stride: (n,) pixels from one row of the page to the next.
+        facet: (n,) facet index.
+        interior: (n,) those all of whose pixels lie in the facet.
     """
 
-    place: IntArray
+    index: IntArray
+    block: IntArray
     x: IntArray
     y: IntArray
     address: IntArray
     stride: IntArray
     facet: Int32Array
-    width: IntArray
-    height: IntArray
+    interior: BoolArray
 
-    def addresses(self, tile: IntArray) -> IntArray:
-        """Quilt addresses (64, G) of the pixels of microtiles (G,)."""
-        lines = self.address[tile] + self.stride[tile] * np.arange(8)[:, None]
-        return (lines[:, None] + np.arange(8)[:, None]).reshape(64, -1)
+    def take(self, rows: IntArray | BoolArray) -> Tiles:
+        """The microtiles with these indices, or where this is true."""
+        return Tiles(*(column[rows] for column in vars(self).values()))
+
+    def lines(self) -> IntArray:
+        """Quilt addresses (n, 8) of the first pixels of their rows."""
+        result: IntArray = self.address[:, None] + self.stride[:, None] * np.arange(8)
+        return result
+
+    def local(self, planes: FloatArray) -> FloatArray:
+        """Planes (..., 3, n) from the microtiles' first pixels, of planes over their blocks."""
+        result = planes.copy()
+        result[..., 2, :] += result[..., 0, :] * self.x + result[..., 1, :] * self.y
+        return result
 
 
 @dataclass(frozen=True)
-class _Rows:
-    """The planes of a batch in rows, one look-up each.
+class Reader:
+    """What is needed to read a canvas; `read_canvas` says what its attributes are."""
 
-    Attributes:
-        of_serial: (S,) row of every serial.
-        numbers: (N, 14) planes of the sum of the edges, the second and the third edge, and 1/t, and
-            the bounds of 1/t.
-        triangle: (N,) triangle index.
-    """
-
-    of_serial: IntArray
-    numbers: FloatArray
-    triangle: Int32Array
+    canvas: Canvas
+    planes: Planes
+    blocks: Blocks
+    limits: DepthRange
+    owners: OwnerArray
+    bits: int
+    wanted: Wanted
+    row_of_serial: IntArray
+    handed: FloatArray
 
 
 def read_canvas(
-    canvas: Canvas, chunks: list[Planes], blocks: Blocks, rays: FloatArray, owners: OwnerArray, bits: int
+    canvas: Canvas,
+    planes: Planes,
+    blocks: Blocks,
+    limits: DepthRange,
+    owners: OwnerArray,
+    bits: int,
+    wanted: Wanted,
 ) -> Iterator[Hits]:
     """The hits of a drawn canvas, a cache-sized number at a time.
 
     Args:
-        canvas: keys of the batch.
-        chunks: its planes.
+        canvas: what was drawn.
+        planes: of all pairs that were.
         blocks: the blocks.
-        rays: (K, 3, 3) from pixels of the batch's blocks to rays.
+        limits: how depth is measured, with the rays of the canvas's blocks.
         owners: who owns each quilt pixel; keys outside their facet and its bleed are dropped.
         bits: bits of the serial in a key.
+        wanted: what the hits shall tell.
     """
-    keys = canvas.keys.reshape(-1, 64)
-    drawn = np.flatnonzero(keys.any(axis=1))
-    if not drawn.size:
+    tiles = _drawn_tiles(canvas, blocks)
+    if not tiles.index.size:
         return
-    tiles = _tiles(canvas, blocks)
-    rows = _rows(chunks)
-    whole = _filled_by_one(keys, drawn, bits) & blocks.interior[blocks_tiles(canvas, blocks)[drawn]]
-    full = drawn[whole]
-    for at in range(0, full.size, _CHUNK // 64):
-        tile = full[at : at + _CHUNK // 64]
-        yield _whole_tiles(tile, rows.of_serial[serial_of(keys[tile, 0], bits)], tiles, rows, rays)
-    rest = drawn[~whole]
-    for at in range(0, rest.size, _CHUNK // 64):
-        tile = rest[at : at + _CHUNK // 64]
-        hits = _single_pixels(tile, keys[tile].T.copy(), tiles, rows, rays, owners, bits)
-        if hits.pixel.size:
+    row_of_serial = np.empty(int(planes.serial.max()) + 1, dtype=np.int64)
+    row_of_serial[planes.serial] = np.arange(planes.serial.size)
+    reader = Reader(canvas, planes, blocks, limits, owners, bits, wanted, row_of_serial, limits.handed)
+    serial, complete = _sort_out(reader, tiles)
+    whole = np.flatnonzero(serial >= 0)
+    for part in _parts(whole):
+        yield _whole_tiles(reader, tiles.take(part), serial[part])
+    for part in _parts(np.flatnonzero(complete)):
+        yield _complete_tiles(reader, tiles.take(part))
+    for part in _parts(np.flatnonzero(~complete & (serial < 0))):
+        hits = _scattered_pixels(reader, tiles.take(part))
+        if hits.first.size:
             yield hits
 
 
-def blocks_tiles(canvas: Canvas, blocks: Blocks) -> IntArray:
-    """Index (M,) of every microtile of a canvas among those of all blocks."""
+def _parts(rows: IntArray) -> Iterator[IntArray]:
+    for at in range(0, rows.size, _TILES):
+        yield rows[at : at + _TILES]
+
+
+def _drawn_tiles(canvas: Canvas, blocks: Blocks) -> Tiles:
+    """The microtiles of a canvas in which anything was drawn."""
+    index = np.flatnonzero(canvas.touched | (canvas.filler > 0))
     place, rank = segments(canvas.tile_start)
-    result: IntArray = blocks.tile_start[canvas.block[place]] + rank
-    return result
-
-
-def _filled_by_one(keys: IntArray, drawn: IntArray, bits: int) -> BoolArray:
-    """Which of the `drawn` microtiles hold one serial in all their pixels."""
-    some = keys if drawn.size == len(keys) else keys[drawn]
-    differences = np.bitwise_or.reduce(some ^ some[:, :1], axis=1)
-    result: BoolArray = (differences & np.int64((1 << bits) - 1)) == 0
-    return result
-
-
-def _tiles(canvas: Canvas, blocks: Blocks) -> _Tiles:
-    """The microtiles of a canvas."""
-    place, rank = segments(canvas.tile_start)
+    place, rank = place[index], rank[index]
     row, column = np.divmod(rank, canvas.tiles_across[place])
     block = canvas.block[place]
     x, y, stride = column * 8, row * 8, blocks.stride[block]
-    address = blocks.address[block] + y * stride + x
-    return _Tiles(
-        place, x, y, address, stride, blocks.facet[block], blocks.width[block], blocks.height[block]
+    return Tiles(
+        index=index,
+        block=place,
+        x=x,
+        y=y,
+        address=blocks.address[block] + y * stride + x,
+        stride=stride,
+        facet=blocks.facet[block],
+        interior=blocks.interior[blocks.tile_start[block] + rank],
     )
 
 
-def _rows(chunks: list[Planes]) -> _Rows:
-    """The planes of a batch as rows."""
-    serial = np.concatenate([c.serial for c in chunks])
-    of_serial = np.zeros(int(serial.max()) + 1, dtype=np.int64)
-    of_serial[serial] = np.arange(serial.size)
-    numbers = np.empty((serial.size, 14))
-    first = 0
-    for c in chunks:
-        part = numbers[first : first + c.serial.size]
-        part[:, 0:3] = (c.edge[0] + c.edge[1] + c.edge[2]).T
-        part[:, 3:6], part[:, 6:9], part[:, 9:12] = c.edge[1].T, c.edge[2].T, c.inverse.T
-        part[:, 12], part[:, 13] = c.low, c.high
-        first += c.serial.size
-    return _Rows(of_serial, numbers, np.concatenate([c.triangle for c in chunks]))
+def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
+    """How the microtiles (n,) are to be read.
+
+    Returns:
+        the serial of the pair that fills a microtile, −1 where pixels have to be looked at; and among
+        those, microtiles inside their facet all of whose pixels see something.
+    """
+    canvas, bits = reader.canvas, reader.bits
+    serial = canvas.filler[tiles.index] - 1
+    border = np.flatnonzero((serial >= 0) & ~tiles.interior)
+    keys = serial_part(serial[border], bits) | _SOME_DEPTH
+    canvas.keys[tiles.index[border]] = keys[:, None]
+    serial[border] = -1
+    keyed = np.flatnonzero((serial < 0) & tiles.interior)
+    keys = canvas.keys.take(tiles.index[keyed], axis=0)
+    full = np.flatnonzero(keys.min(axis=1) > 0)
+    keyed, keys = keyed[full], keys[full]
+    one = np.bitwise_or.reduce(keys ^ keys[:, :1], axis=1) & np.int64((1 << bits) - 1) == 0
+    serial[keyed[one]] = serial_of(keys[one, 0], bits)
+    complete = np.zeros(serial.size, dtype=np.bool_)
+    complete[keyed[~one]] = True
+    return serial, complete
 
 
-def _whole_tiles(tile: IntArray, row: IntArray, tiles: _Tiles, rows: _Rows, rays: FloatArray) -> Hits:
-    """Hits of microtiles (G,) that are filled by one pair each, a group of 64 pixels for each."""
-    numbers = rows.numbers[row].T.copy()
-    x, y = tiles.x[tile].astype(np.float64), tiles.y[tile].astype(np.float64)
-    inverse = _over_tiles(numbers[9:12], x, y)
-    np.clip(inverse, numbers[12], numbers[13], out=inverse)
-    b, c = _weights(*(_over_tiles(numbers[k : k + 3], x, y) for k in (0, 3, 6)))
-    position = _rays(tile, tiles, rays, x, y)
-    position /= inverse
-    pixel = tiles.addresses(tile)
-    return Hits(pixel, tiles.facet[tile], rows.triangle[row], b, c, position, pixel.size)
-
-
-def _over_tiles(plane: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Values (64, G) of planes (3, G) at the pixels of microtiles that start at x, y (G,)."""
-    a, b, c = plane
-    lines = b * _EIGHT
-    lines += a * x + b * y + c
-    result: FloatArray = (lines[:, None] + a * _EIGHT).reshape(64, -1)
-    return result
-
-
-def _rays(tile: IntArray, tiles: _Tiles, rays: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Eye rays (3, 64, G) through the pixels of microtiles (G,) that start at x, y."""
-    matrix = np.ascontiguousarray(rays[tiles.place[tile]].transpose(1, 2, 0))
-    return np.stack([_over_tiles(line, x, y) for line in matrix])
-
-
-def _single_pixels(
-    tile: IntArray,
-    keys: IntArray,
-    tiles: _Tiles,
-    rows: _Rows,
-    rays: FloatArray,
-    owners: OwnerArray,
-    bits: int,
-) -> Hits:
-    """Hits of the drawn pixels of microtiles (M,) with keys (64, M), where their facet owns the pixel."""
-    x, y = tiles.x[tile] + _DX, tiles.y[tile] + _DY
-    drawn = np.flatnonzero((keys != 0) & (x < tiles.width[tile]) & (y < tiles.height[tile]))
-    pixel = tiles.addresses(tile).ravel()[drawn]
-    group = drawn % tile.size
-    facet = tiles.facet[tile][group]
-    owner = owners[pixel]
-    own = np.flatnonzero(np.abs(owner) == facet + 1)
-    drawn = drawn[own]
-    row = rows.of_serial[serial_of(keys.ravel()[drawn], bits)]
-    numbers = rows.numbers[row].T.copy()
-    fx, fy = x.ravel()[drawn].astype(np.float64), y.ravel()[drawn].astype(np.float64)
-
-    def at_pixels(k: int) -> FloatArray:
-        result: FloatArray = numbers[k] * fx + numbers[k + 1] * fy + numbers[k + 2]
-        return result
-
-    inverse = np.clip(at_pixels(9), numbers[12], numbers[13])
-    b, c = _weights(at_pixels(0), at_pixels(3), at_pixels(6))
-    corner = tiles.x[tile].astype(np.float64), tiles.y[tile].astype(np.float64)
-    position = _rays(tile, tiles, rays, *corner).reshape(3, -1)[:, drawn]
-    position /= inverse
+def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray) -> Hits:
+    """Hits of microtiles (G,) that are filled by one pair each."""
+    wanted = reader.wanted
+    seen = surfaces(reader.planes, reader.row_of_serial[serial], wanted, reader.handed)
+    inverse = exact_values(tiles.local(seen.inverse))
+    ray, depth, position = _rays(reader, tiles)
+    depth /= inverse
+    weights = None
+    if wanted.weights:
+        second, third, total = (exact_values(plane) for plane in tiles.local(seen.weights))
+        weights = np.stack((second / total, third / total)).astype(np.float32)
     return Hits(
-        pixel=pixel[own][None],
-        facet=facet[own],
-        triangle=rows.triangle[row],
-        b=b[None],
-        c=c[None],
-        position=position[:, None],
-        inside=int(np.count_nonzero(owner[own] > 0)),
+        first=tiles.lines().reshape(-1),
+        run=RUN,
+        facet=tiles.facet,
+        triangle=seen.triangle,
+        ray=ray,
+        depth=depth,
+        normal=None if wanted.normals is None else vector_values(tiles.local(seen.normal)),
+        weights=weights,
+        position=None if position is None else position / inverse,
+        inside=depth.size,
     )
 
 
-def _weights(total: FloatArray, second: FloatArray, third: FloatArray) -> tuple[Float32Array, Float32Array]:
-    """Barycentric weights of the second and third corner: their edge functions' shares of the sum."""
-    np.reciprocal(total, out=total)
-    return (second * total).astype(np.float32), (third * total).astype(np.float32)
+def _rays(reader: Reader, tiles: Tiles) -> tuple[Float32Array, FloatArray, FloatArray | None]:
+    """Rays d through the pixels of n microtiles.
+
+    Returns:
+        d (3, n, 64) of any length; the depth (n, 64) of the points d; and these points (3, n, 64), the
+        eye at the origin, where positions are wanted.
+    """
+    limits = reader.limits
+    matrix = np.ascontiguousarray(limits.rays.transpose(1, 2, 0))
+    ray = tiles.local(np.take(matrix, tiles.block, axis=2))
+    exact = None
+    if limits.radial or reader.wanted.position:
+        exact = np.stack([exact_values(plane) for plane in ray])
+    if limits.radial and exact is not None:
+        depth = np.sqrt(exact[0] * exact[0] + exact[1] * exact[1] + exact[2] * exact[2])
+    else:
+        look = limits.look
+        depth = exact_values(look[0] * ray[0] + look[1] * ray[1] + look[2] * ray[2])
+    return vector_values(ray), depth, exact if reader.wanted.position else None
+
+
+def _complete_tiles(reader: Reader, tiles: Tiles) -> Hits:
+    """Hits of microtiles in their facets all of whose pixels see something."""
+    keys = reader.canvas.keys.take(tiles.index, axis=0).reshape(-1)
+    return _pixels(reader, tiles, keys, None, tiles.lines().reshape(-1), keys.size)
+
+
+def _scattered_pixels(reader: Reader, tiles: Tiles) -> Hits:
+    """Hits of those pixels of microtiles that see something and that their facet owns."""
+    block = reader.canvas.block[tiles.block]
+    keys = reader.canvas.keys.take(tiles.index, axis=0)
+    drawn = keys != 0
+    drawn &= (reader.blocks.width[block] - tiles.x)[:, None] > _DX
+    drawn &= (reader.blocks.height[block] - tiles.y)[:, None] > _DY
+    pixel = np.flatnonzero(drawn)
+    address = (tiles.lines()[:, :, None] + np.arange(8)).reshape(-1).take(pixel)
+    owner = reader.owners.take(address)
+    own = np.flatnonzero(np.abs(owner) == tiles.facet.take(pixel >> 6) + 1)
+    pixel = pixel.take(own)
+    inside = int(np.count_nonzero(owner.take(own) > 0))
+    return _pixels(reader, tiles, keys.reshape(-1).take(pixel), pixel, address.take(own), inside)
+
+
+def _pixels(
+    reader: Reader, tiles: Tiles, keys: IntArray, pixel: IntArray | None, first: IntArray, inside: int
+) -> Hits:
+    """Hits of pixels of microtiles, each a group of its own.
+
+    Args:
+        reader: the canvas.
+        tiles: n microtiles.
+        keys: (G,) keys of the pixels.
+        pixel: (G,) the pixels, counted through all microtiles; None for all 64·n of them.
+        first: addresses of the pixels, or of runs of them where they are all.
+        inside: pixels that are not bleed.
+    """
+    if pixel is None:
+        pixel = np.arange(keys.size)
+    row, which = _distinct(reader.row_of_serial.take(serial_of(keys, reader.bits)), reader.planes.serial.size)
+    seen = surfaces(reader.planes, row, reader.wanted, reader.handed)
+    numbers = seen.numbers.take(which, axis=0)
+    x = (tiles.x[:, None] + _DX).reshape(-1).take(pixel).astype(np.float64)
+    y = (tiles.y[:, None] + _DY).reshape(-1).take(pixel).astype(np.float64)
+
+    def values(column: int) -> FloatArray:
+        result = numbers[:, column] * x
+        result += numbers[:, column + 1] * y
+        result += numbers[:, column + 2]
+        return np.asarray(result[:, None])
+
+    inverse = values(2)
+    np.maximum(inverse, numbers[:, 0:1], out=inverse)
+    np.minimum(inverse, numbers[:, 1:2], out=inverse)
+    ray, depth, position = _rays(reader, tiles)
+    normal = weights = None
+    if reader.wanted.normals is not None:
+        normal = np.stack([values(column).astype(np.float32) for column in (5, 8, 11)])
+    if reader.wanted.weights:
+        second, third, total = (values(numbers.shape[1] - k) for k in (9, 6, 3))
+        weights = np.stack((second / total, third / total)).astype(np.float32)
+    return Hits(
+        first=first,
+        run=RUN if first.size < keys.size else 1,
+        facet=tiles.facet.take(pixel >> 6),
+        triangle=seen.triangle.take(which),
+        ray=ray.reshape(3, -1, 1).take(pixel, axis=1),
+        depth=depth.reshape(-1, 1).take(pixel, axis=0) / inverse,
+        normal=normal,
+        weights=weights,
+        position=None if position is None else position.reshape(3, -1, 1).take(pixel, axis=1) / inverse,
+        inside=inside,
+    )
+
+
+def _distinct(values: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """The distinct numbers among `values`, all below `count`, and the place of each value among them."""
+    there = np.zeros(count, dtype=np.bool_)
+    there[values] = True
+    distinct = np.flatnonzero(there)
+    place = np.empty(count, dtype=np.int64)
+    place[distinct] = np.arange(distinct.size)
+    return distinct, place.take(values)

@@ -50,9 +50,9 @@ class Lights:
     headlight: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
-    """T triangles over V vertices, baked to world space.
+    """T triangles over V vertices, baked to world space; equal only to itself.
 
     Attributes:
         vertices: (V, 3) world metres.

@@ -20,7 +20,7 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (binning, "core_of_vertices", "bin: first pass"),
     (binning, "_second_pass", "bin: second pass"),
     (draw, "split_pairs", "prewarp"),
-    (raster, "make_planes", "prewarp"),
+    (raster, "warp", "prewarp"),
     (raster, "draw_small", "small triangles"),
     (raster, "draw_large", "large triangles"),
     (raster, "read_canvas", "visibility"),
