@@ -1,27 +1,28 @@
 """One frame of the quilt: from a pose of the viewer to the pixels of all pages.
 
 `Stage` holds what the viewer cannot change and is set up once a job; `draw_frame` is all that happens
-a frame, in the order of the paper's pipeline: bin, prewarp, rasterize, shade.
+a frame, in the order of the paper's pipeline: bin, then, batch by batch, prewarp, rasterize, shade.
 """
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.binning import Pairs, Parts, bin_triangles, facet_parts
+from quiltcli.binframe import Binned, BinPlan, bin_frame, bin_plan
+from quiltcli.binning import Parts, facet_parts
 from quiltcli.channels import empty_buffers, exr_channels, fill, wanted_for
 from quiltcli.display import Facets, lit_facets, load_display
-from quiltcli.geometry import BoolArray, FloatArray, OwnerArray, dot
-from quiltcli.homography import quilt_rays
+from quiltcli.geometry import BoolArray, IntArray, OwnerArray, dot
+from quiltcli.homography import QuiltRays, quilt_rays
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.orders import DepthOrder, depth_order
@@ -30,13 +31,10 @@ from quiltcli.raster import (
     Blocks,
     Frame,
     Hits,
-    Sight,
     batches,
     block_window,
     cut_blocks,
     rasterize,
-    split_pairs,
-    triangles_in_range,
 )
 from quiltcli.report import FrameRecord
 from quiltcli.scene import Scene, load_scene
@@ -44,8 +42,6 @@ from quiltcli.shading import MOST_HALF, shade, shading_wants
 from quiltcli.viewer import Viewer
 
 Buffers = dict[str, NDArray[Any]]
-Runner: TypeAlias = Callable[[Frame, Sequence[tuple[int, int]], Buffers], int]
-"""Draws batches of a frame into buffers; returns how many pixels of facets show the scene."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +115,42 @@ def new_buffers(stage: Stage) -> Buffers:
     return empty_buffers(stage.job.output.channels, stage.owners.size)
 
 
+class Crew(Protocol):
+    """Whoever does the work of a frame that can be divided."""
+
+    def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
+        """Bin the scene."""
+
+    def clear(self, blocks: IntArray, buffers: Buffers) -> None:
+        """Empty the pixels of blocks."""
+
+    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers) -> int:
+        """Draw batches; how many pixels of facets show the scene."""
+
+
+@dataclass(frozen=True)
+class Threads:
+    """A crew of threads of this process."""
+
+    stage: Stage
+    threads: int
+
+    def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
+        """Bin the scene, in one thread."""
+        return bin_frame(plan_of(self.stage, viewer, rays))
+
+    def clear(self, blocks: IntArray, buffers: Buffers) -> None:
+        """Empty the pixels of blocks."""
+        clear_blocks(self.stage, blocks, buffers)
+
+    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers) -> int:
+        """Draw batches, each in a thread; how many pixels of facets show the scene."""
+        if self.threads == 1:
+            return sum(draw_batch(self.stage, frame, batch, buffers) for batch in work)
+        with ThreadPoolExecutor(self.threads) as pool:
+            return sum(pool.map(lambda batch: draw_batch(self.stage, frame, batch, buffers), work))
+
+
 def draw_frame(
     stage: Stage,
     viewer: Viewer,
@@ -127,7 +159,7 @@ def draw_frame(
     only: BoolArray | None = None,
     *,
     dirty: BoolArray | None = None,
-    run: Runner | None = None,
+    crew: Crew | None = None,
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet.
 
@@ -138,89 +170,82 @@ def draw_frame(
         threads: batches drawn at a time; the pixels do not depend on it.
         only: (F,) facets to draw; the pixels of all others are left as they are.
         dirty: (F,) facets whose pixels may hold something; all, where it is not known.
-        run: draws the batches instead of threads.
+        crew: does the work instead of threads.
 
     Returns:
         The frame's record.
     """
     clock = Clock()
-    scene, job = stage.scene, stage.job
+    crew = crew or Threads(stage, threads)
     lit = lit_facets(stage.facets, viewer.eye)
     if only is not None:
         lit &= only
     with clock.stage("bin"):
         rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
-        vertices = scene.vertices - viewer.eye
-        wanted, cut = triangles_in_range(vertices, scene.triangles, viewer)
-        if job.render.backface_culling:
-            wanted &= faces_eye(scene, viewer.eye)
-        pairs = bin_triangles(vertices, scene.triangles, wanted, stage.parts, rays.lit, viewer.eye)
-    with clock.stage("prewarp"):
-        sight = Sight(vertices, scene.triangles, cut)
-        block_pairs = split_pairs(pairs, sight, rays, stage.blocks)
-        frame = Frame(viewer, sight, rays, stage.blocks, block_pairs, stage.owners)
+        binned = crew.bin(viewer, rays)
     with clock.stage("clear"):
-        clear(stage, buffers, only, dirty)
-        lay_background(stage, rays.lit, buffers)
+        if only is None and dirty is not None:
+            crew.clear(np.flatnonzero(dirty[stage.blocks.facet]), buffers)
+        else:
+            clear(stage, buffers, only)
     with clock.stage("rasterize and shade"):
-        visible = (run or in_threads(stage, threads))(frame, batches(frame), buffers)
+        frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs, stage.owners)
+        backed = rays.lit[stage.blocks.facet] if has_background(stage) else None
+        visible = crew.draw(frame, batches(frame, backed), buffers)
     return FrameRecord(
         frame=viewer.frame,
-        triangles=int(np.count_nonzero(wanted)),
-        reaching=pairs.reaching,
-        pairs=pairs.facet.size,
-        settled=pairs.settled,
+        triangles=binned.triangles,
+        reaching=binned.reaching,
+        pairs=binned.facet_pairs,
+        settled=binned.settled,
         lit_facets=int(np.count_nonzero(rays.lit)),
         visible_pixels=visible,
         fill=stage.fill,
         seconds=clock.seconds,
-        warnings=tuple(frame_warnings(stage, viewer, lit, pairs, visible)),
+        warnings=tuple(frame_warnings(stage, viewer, lit, binned.facet_pairs, visible)),
     )
 
 
-def faces_eye(scene: Scene, eye: FloatArray) -> BoolArray:
-    """Triangles (T,) whose winding is counter-clockwise as seen from `eye` (3,)."""
-    x, y, z, offset = scene.planes
-    result: BoolArray = x * eye[0] + y * eye[1] + z * eye[2] > offset
-    return result
+def plan_of(stage: Stage, viewer: Viewer, rays: QuiltRays) -> BinPlan:
+    """How a frame of the stage is binned."""
+    culling = stage.job.render.backface_culling
+    return bin_plan(stage.scene, stage.parts, stage.blocks, viewer, rays, culling=culling)
 
 
-def in_threads(stage: Stage, threads: int) -> Runner:
-    """Draws batches in threads of this process."""
-
-    def run(frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers) -> int:
-        with ThreadPoolExecutor(threads) as pool:
-            return sum(pool.map(lambda batch: draw_batch(stage, frame, batch, buffers), work))
-
-    return run
+def clear(stage: Stage, buffers: Buffers, only: BoolArray | None) -> None:
+    """Empty the pixels of the facets in `only`, or everything."""
+    mine = slice(None) if only is None else np.concatenate(([False], only))[np.abs(stage.owners)]
+    for name, value in empty_values(stage).items():
+        buffers[name][mine] = value
 
 
-def clear(stage: Stage, buffers: Buffers, only: BoolArray | None, dirty: BoolArray | None) -> None:
-    """Empty the pixels of the facets in `only`, or of all that are `dirty`, or everything."""
-    empty = {name: value for name, (_, value) in exr_channels(stage.job.output.channels).items()}
-    if only is not None:
-        mine = np.concatenate(([False], only))[np.abs(stage.owners)]
+def clear_blocks(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
+    """Empty the pixels of the blocks with these indices."""
+    empty = empty_values(stage)
+    for block in blocks.tolist():
         for name, value in empty.items():
-            buffers[name][mine] = value
-    elif dirty is None:
-        for name, value in empty.items():
-            buffers[name].fill(value)
-    else:
-        for block in np.flatnonzero(dirty[stage.blocks.facet]).tolist():
-            for name, value in empty.items():
-                block_window(buffers[name], stage.blocks, block).fill(value)
+            block_window(buffers[name], stage.blocks, block).fill(value)
 
 
-def lay_background(stage: Stage, lit: BoolArray, buffers: Buffers) -> None:
-    """Give the pixels of lit facets the background's colour."""
-    color = stage.scene.background
-    if "rgba" not in stage.job.output.channels or not color.any():
+def empty_values(stage: Stage) -> dict[str, float]:
+    """What every buffer holds where nothing is seen."""
+    return {name: value for name, (_, value) in exr_channels(stage.job.output.channels).items()}
+
+
+def has_background(stage: Stage) -> bool:
+    """Whether pixels that do not see the scene have a colour."""
+    return "rgba" in stage.job.output.channels and bool(stage.scene.background.any())
+
+
+def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
+    """Give the pixels of these blocks that their facets own the background's colour, if there is one."""
+    if not has_background(stage):
         return
-    for block in np.flatnonzero(lit[stage.blocks.facet]).tolist():
+    for block in blocks.tolist():
         owner = block_window(stage.owners, stage.blocks, block)
         facet = int(stage.blocks.facet[block]) + 1
         mine = (owner == facet) | (owner == -facet)
-        for name, value in zip("RGB", color, strict=True):
+        for name, value in zip("RGB", stage.scene.background, strict=True):
             pixels = block_window(buffers[name], stage.blocks, block)
             np.copyto(pixels, value, where=mine, casting="same_kind")
 
@@ -232,6 +257,8 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
         How many pixels of facets, bleed left out, show the scene.
     """
     frame = ordered(stage, frame)
+    block = np.arange(*batch)
+    lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers)
     channels = stage.job.output.channels
     samples = stage.job.render.samples
     if samples > 1:
@@ -301,11 +328,11 @@ def sample_places(samples: int) -> list[tuple[float, float]]:
     return places
 
 
-def frame_warnings(stage: Stage, viewer: Viewer, lit: BoolArray, pairs: Pairs, visible: int) -> Iterator[str]:
+def frame_warnings(stage: Stage, viewer: Viewer, lit: BoolArray, pairs: int, visible: int) -> Iterator[str]:
     """What a user should know of a frame that shows little or nothing."""
     if not lit.any():
         yield "the eye is behind every facet: nothing is lit"
-    elif not pairs.facet.size:
+    elif not pairs:
         yield "no triangle of the scene shows on any facet"
     elif not visible:
         yield "no pixel shows the scene"

@@ -1,4 +1,4 @@
-"""Worker processes that draw the batches of a frame into shared memory.
+"""Worker processes that bin and draw a frame in shared memory.
 
 Threads gain little here: much of numpy holds the interpreter's lock. So the workers are forked once,
 with everything the frames share already in memory, and nothing of it is ever copied or sent. What
@@ -16,24 +16,27 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.binframe import Binned, BinPlan, Seen, Share, bin_frame, bin_share, join, see_vertices
 from quiltcli.channels import exr_channels
-from quiltcli.draw import Buffers, Stage, draw_batch, in_threads
+from quiltcli.draw import Buffers, Stage, Threads, clear_blocks, draw_batch, plan_of
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
-from quiltcli.homography import quilt_rays
+from quiltcli.homography import QuiltRays, quilt_rays
 from quiltcli.raster import BlockPairs, Frame, Sight
 from quiltcli.viewer import Viewer
 
 _ROOM = 64  # pairs a triangle there is room for; memory that is not touched costs nothing
 _LEAST_ROOM = 1 << 26
+_SHARES = 4  # of a worker in what can be cut at will, so that none waits long for the last
 _MANY_PIXELS = 1 << 20
 _MANY_TRIANGLES = 50_000
 
@@ -69,33 +72,57 @@ class _Arena:
     """Where the arrays of the frame under way lie.
 
     Attributes:
-        vertices: (V, 3) world minus eye.
-        cut: (T,) triangles cut by near or far.
+        seen: what is known of vertices and triangles.
+        keys: (capacity,) block pairs, those of triangle t from t·capacity/T on.
         start: (B+1,) offsets of the blocks' pairs.
         triangle: (capacity,) their triangles.
     """
 
-    vertices: NDArray[np.float64]
-    cut: BoolArray
+    seen: Seen
+    keys: NDArray[np.int64]
     start: NDArray[np.int64]
     triangle: NDArray[np.int32]
+
+    def keys_of(self, part: slice) -> NDArray[np.int64]:
+        """Room for the pairs of some of the triangles."""
+        room = self.keys.size // max(len(self.seen.cut), 1)
+        return self.keys[part.start * room : part.stop * room]
+
+    def pairs(self) -> BlockPairs:
+        """The frame's pairs by block."""
+        return BlockPairs(self.start, self.triangle[: self.start[-1]])
+
+
+def _new_arena(stage: Stage) -> _Arena:
+    vertices, triangles = len(stage.scene.vertices), len(stage.scene.triangles)
+    room = max(_ROOM * triangles, _LEAST_ROOM)
+    return _Arena(
+        Seen(
+            shared_array(3 * vertices, np.float64).reshape(-1, 3),
+            shared_array(vertices, np.float64),
+            shared_array(vertices, np.int32),
+            shared_array(triangles, np.bool_),
+        ),
+        shared_array(room, np.int64),
+        shared_array(len(stage.blocks.facet) + 1, np.int64),
+        shared_array(room, np.int32),
+    )
 
 
 @dataclass(frozen=True)
 class _Task:
-    """What a worker is told of a frame.
-
-    Attributes:
-        viewer: the viewer.
-        lit: (F,) facets that are drawn.
-        pairs: number of block pairs.
-        buffers: which of the buffers to draw into.
-    """
+    """What a worker is told of a frame before its work: the viewer, and the facets (F,) that are drawn."""
 
     viewer: Viewer
     lit: BoolArray
-    pairs: int
-    buffers: int
+
+
+@dataclass(frozen=True)
+class _Item:
+    """A piece of work: a method of `_Workplace`, and what it is given."""
+
+    name: str
+    given: tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -112,8 +139,8 @@ class _Worker:
         except OSError:
             raise self._died(frame) from None
 
-    def hear(self, frame: int) -> int | None:
-        """The answer to a batch: its visible pixels, or None when there is no batch left to answer."""
+    def hear(self, frame: int) -> Any:
+        """The answer to a piece of work."""
         try:
             answer = self.connection.recv()
         except (EOFError, OSError):
@@ -121,7 +148,7 @@ class _Worker:
         if isinstance(answer, _Fault):
             words = f"frame {frame}: a worker failed:\n{answer.traceback}"
             raise RuntimeError(words)  # noqa: TRY004 — the type is right; it is the news that is bad
-        return None if answer is None else int(answer)
+        return answer
 
     def _died(self, frame: int) -> CheckFailedError:
         """The error of a worker that is gone."""
@@ -145,23 +172,18 @@ class Pool:
     """Forked workers of one stage; a context manager that ends them."""
 
     def __init__(self, stage: Stage, buffers: Sequence[Buffers], workers: int) -> None:
-        scene = stage.scene
-        triangles = len(scene.triangles)
         self._stage = stage
         self._buffers = buffers
-        self._arena = _Arena(
-            shared_array(scene.vertices.size, np.float64).reshape(-1, 3),
-            shared_array(triangles, np.bool_),
-            shared_array(len(stage.blocks.facet) + 1, np.int64),
-            shared_array(max(_ROOM * triangles, _LEAST_ROOM), np.int32),
-        )
-        _ = scene.corner_normals, scene.corner_colors  # made once, before there are copies of the process
+        self._arena = _new_arena(stage)
+        self._frame = 0
+        # Made once, before there are copies of the process.
+        _ = stage.scene.planes, stage.scene.corner_normals, stage.scene.corner_colors
         context = multiprocessing.get_context("fork")
         self._workers: list[_Worker] = []
         for _number in range(workers):
             ours, theirs = context.Pipe()
-            arguments = (theirs, stage, buffers, self._arena, os.getpid())
-            process = context.Process(target=_serve, args=arguments, daemon=True)
+            place = _Workplace(stage, buffers, self._arena)
+            process = context.Process(target=_serve, args=(theirs, place, os.getpid()), daemon=True)
             process.start()
             theirs.close()
             self._workers.append(_Worker(process, ours))
@@ -182,81 +204,147 @@ class Pool:
             worker.process.join()
         self._workers = []
 
-    def draw(self, frame: Frame, batches: Sequence[tuple[int, int]], buffers: Buffers) -> int:
+    def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
+        """Bin the scene.
+
+        Raises:
+            CheckFailedError: a worker died; by the other methods, too.
+        """
+        self._frame = viewer.frame
+        for worker in self._workers:
+            worker.tell(self._frame, _Task(viewer, rays.lit))
+        seen, arena = self._arena.seen, self._arena
+        self._share_out(_Item("see", (part,)) for part in self._shares(len(seen.vertices)))
+        parts = self._shares(len(seen.cut))
+        shares = self._share_out(_Item("bin", (part,)) for part in parts)
+        plan = plan_of(self._stage, viewer, rays)
+        if None in shares:
+            return bin_frame(plan)
+        found = [
+            replace(share, keys=arena.keys_of(part)[:count])
+            for (share, count), part in zip(shares, parts, strict=True)
+        ]
+        binned = join(plan, seen, found)
+        if binned.pairs.triangle.size > arena.triangle.size:
+            return binned
+        arena.start[:] = binned.pairs.start
+        arena.triangle[: binned.pairs.triangle.size] = binned.pairs.triangle
+        return replace(binned, pairs=arena.pairs())
+
+    def clear(self, blocks: NDArray[np.int64], buffers: Buffers) -> None:
+        """Empty the pixels of blocks in one of the pool's buffers."""
+        index = self._index(buffers)
+        parts = [part for part in np.array_split(blocks, _SHARES * len(self._workers)) if part.size]
+        self._share_out(_Item("clear", (part, index)) for part in parts)
+
+    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers) -> int:
         """Draw batches into one of the pool's buffers.
 
         Returns:
             How many pixels of facets show the scene.
-
-        Raises:
-            CheckFailedError: a worker died.
         """
         pairs = frame.pairs
-        if pairs.triangle.size > self._arena.triangle.size:
-            return in_threads(self._stage, len(self._workers))(frame, batches, buffers)
-        self._arena.vertices[:] = frame.sight.vertices
-        self._arena.cut[:] = frame.sight.cut
-        self._arena.start[:] = pairs.start
-        self._arena.triangle[: pairs.triangle.size] = pairs.triangle
-        index = next(i for i, known in enumerate(self._buffers) if known is buffers)
-        task = _Task(frame.viewer, frame.rays.lit, pairs.triangle.size, index)
-        cost = [int(pairs.start[last] - pairs.start[first]) for first, last in batches]
-        waiting = [batches[i] for i in np.argsort(cost, kind="stable").tolist()]  # dearest last: popped first
-        number, visible = frame.viewer.frame, 0
-        busy: dict[Any, _Worker] = {worker.connection: worker for worker in self._workers}
+        if pairs.start is not self._arena.start:
+            return Threads(self._stage, len(self._workers)).draw(frame, work, buffers)
+        index = self._index(buffers)
+        cost = [int(pairs.start[last] - pairs.start[first]) for first, last in work]
+        dearest = np.argsort(cost, kind="stable")[::-1].tolist()
+        return sum(self._share_out(_Item("draw", (work[i], index)) for i in dearest))
+
+    def _index(self, buffers: Buffers) -> int:
+        return next(i for i, known in enumerate(self._buffers) if known is buffers)
+
+    def _shares(self, count: int) -> list[slice]:
+        """Ranges of `count` things to be handed out."""
+        ends = np.linspace(0, count, _SHARES * len(self._workers) + 1).astype(np.int64).tolist()
+        return [slice(first, last) for first, last in pairwise(ends)]
+
+    def _share_out(self, items: Iterable[_Item]) -> list[Any]:
+        """Hand out work as workers become free; the answers in the order of the items."""
+        waiting = list(items)[::-1]
+        answers: list[Any] = [None] * len(waiting)
+        busy: dict[Any, tuple[_Worker, int]] = {}
+
+        def hand_out(worker: _Worker) -> None:
+            if waiting:
+                busy[worker.connection] = worker, len(answers) - len(waiting)
+                worker.tell(self._frame, waiting.pop())
+
         for worker in self._workers:
-            worker.tell(number, task)
-            worker.tell(number, waiting.pop() if waiting else None)
+            hand_out(worker)
         while busy:
             for connection in wait(list(busy)):
-                answer = busy[connection].hear(number)
-                if answer is None:
-                    del busy[connection]
-                else:
-                    visible += answer
-                    busy[connection].tell(number, waiting.pop() if waiting else None)
-        return visible
+                worker, number = busy.pop(connection)
+                answers[number] = worker.hear(self._frame)
+                hand_out(worker)
+        return answers
 
 
-def _serve(
-    connection: Connection, stage: Stage, buffers: Sequence[Buffers], arena: _Arena, parent: int
-) -> None:
-    """A worker's life: take frames, draw batches, answer; end when the parent is gone."""
+class _Workplace:
+    """What a worker has at hand; its public methods are the work it can be given."""
+
+    def __init__(self, stage: Stage, buffers: Sequence[Buffers], arena: _Arena) -> None:
+        self._stage, self._buffers, self._arena = stage, buffers, arena
+        self._plan: BinPlan | None = None
+        self._frame: Frame | None = None
+
+    def begin(self, task: _Task) -> None:
+        """Turn to another frame."""
+        rays = quilt_rays(self._stage.facets, self._stage.layout, task.lit, task.viewer.eye)
+        self._plan, self._frame = plan_of(self._stage, task.viewer, rays), None
+
+    def see(self, part: slice) -> None:
+        """Find out about some of the vertices."""
+        see_vertices(self.plan, part, self._arena.seen)
+
+    def bin(self, part: slice) -> tuple[Share, int] | None:
+        """Bin some of the triangles.
+
+        Returns:
+            the share without its keys, which go into the arena, and their number; None if there is no
+            room for so many.
+        """
+        share = bin_share(self.plan, part, self._arena.seen)
+        room = self._arena.keys_of(part)
+        if share.keys.size > room.size:
+            return None
+        room[: share.keys.size] = share.keys
+        return replace(share, keys=share.keys[:0]), share.keys.size
+
+    def clear(self, blocks: NDArray[np.int64], index: int) -> None:
+        """Empty the pixels of some blocks."""
+        clear_blocks(self._stage, blocks, self._buffers[index])
+
+    def draw(self, batch: tuple[int, int], index: int) -> int:
+        """Draw a batch; its visible pixels."""
+        if self._frame is None:
+            seen, plan, stage = self._arena.seen, self.plan, self._stage
+            sight = Sight(seen.vertices, stage.scene.triangles, seen.cut)
+            pairs = self._arena.pairs()
+            self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs, stage.owners)
+        return draw_batch(self._stage, self._frame, batch, self._buffers[index])
+
+    @property
+    def plan(self) -> BinPlan:
+        """How the frame is binned."""
+        assert self._plan is not None, "no frame has begun"
+        return self._plan
+
+
+def _serve(connection: Connection, place: _Workplace, parent: int) -> None:
+    """A worker's life: take frames and work, answer; end when the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches everybody; the parent decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-    def hear() -> Any:
-        while not connection.poll(1.0):
-            if os.getppid() != parent:
-                os._exit(0)
-        return connection.recv()
-
     with contextlib.suppress(EOFError, OSError):
         while True:
-            _draw_task(hear(), hear, connection, stage, buffers, arena)
-
-
-def _draw_task(
-    task: _Task,
-    hear: Callable[[], Any],
-    connection: Connection,
-    stage: Stage,
-    buffers: Sequence[Buffers],
-    arena: _Arena,
-) -> None:
-    """Draw the batches of one frame that the parent hands out."""
-    try:
-        viewer = task.viewer
-        frame = Frame(
-            viewer,
-            Sight(arena.vertices, stage.scene.triangles, arena.cut),
-            quilt_rays(stage.facets, stage.layout, task.lit, viewer.eye),
-            stage.blocks,
-            BlockPairs(arena.start, arena.triangle[: task.pairs]),
-            stage.owners,
-        )
-        while (batch := hear()) is not None:
-            connection.send(draw_batch(stage, frame, batch, buffers[task.buffers]))
-        connection.send(None)
-    except Exception:
-        connection.send(_Fault(traceback.format_exc()))
+            while not connection.poll(1.0):
+                if os.getppid() != parent:
+                    os._exit(0)
+            given = connection.recv()
+            try:
+                if isinstance(given, _Task):
+                    place.begin(given)
+                else:
+                    connection.send(getattr(place, given.name)(*given.given))
+            except Exception:
+                connection.send(_Fault(traceback.format_exc()))

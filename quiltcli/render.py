@@ -175,8 +175,9 @@ def render_frames(
             writer.leave(len(sheets) - 1)
             if ready.only is not None:
                 read_quilt(stage, ready.out, viewer.frame, sheets[turn])
-            run = pool.draw if pool else None
-            record = draw_frame(stage, viewer, sheets[turn], threads, ready.only, dirty=dirty[turn], run=run)
+            record = draw_frame(
+                stage, viewer, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool
+            )
             dirty[turn] = lit_facets(stage.facets, viewer.eye)
             writer.take(record, viewer, sheets[turn])
         writer.leave(0)

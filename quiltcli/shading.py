@@ -108,10 +108,11 @@ def _points(scene: Scene, hits: Hits) -> _Points:
 
 def _unit(vectors: Float32Array, sign: np.float32 = _ONE) -> Float32Array:
     """Unit vectors along the first axis, times `sign`."""
-    length2 = _dot(vectors, vectors)
-    length2 += _LEAST_LENGTH2
-    scale = np.divide(sign, np.sqrt(length2, out=length2), out=length2)
-    return np.asarray(vectors * scale)
+    scale = _dot(vectors, vectors)
+    scale += _LEAST_LENGTH2
+    np.divide(sign, np.sqrt(scale, out=scale), out=scale)
+    result: Float32Array = vectors * scale
+    return result
 
 
 def _colors(table: Float32Array, hits: Hits) -> Float32Array:

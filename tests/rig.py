@@ -130,7 +130,7 @@ def picture(
     owners = pixel_owners(layout, bleed)
     rays = quilt_rays(facets, layout, lit_facets(facets, eye.eye), eye.eye)
     local = vertices - eye.eye
-    wanted, cut = triangles_in_range(local, triangles, eye)
+    wanted, cut = triangles_in_range(eye.depth_of(local.T), local, triangles, eye)
     pairs = bin_triangles(local, triangles, wanted, facet_parts(facets, layout, bleed), rays.lit, eye.eye)
     sight = Sight(local, triangles, cut)
     blocks = cut_blocks(layout, bleed, owners)

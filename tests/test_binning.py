@@ -67,7 +67,8 @@ class Binned:
         self.viewer = viewer(eye, depth="radial", near=1e-3)
         self.vertices = corners.reshape(-1, 3) - self.viewer.eye
         self.triangles = np.arange(1200, dtype=np.int32).reshape(-1, 3)
-        wanted, _ = triangles_in_range(self.vertices, self.triangles, self.viewer)
+        depth = self.viewer.depth_of(self.vertices.T)
+        wanted, _ = triangles_in_range(depth, self.vertices, self.triangles, self.viewer)
         self.parts = facet_parts(self.facets, self.layout, bleed)
         self.lit = lit_facets(self.facets, self.viewer.eye)
         self.pairs = bin_triangles(

@@ -13,7 +13,7 @@ from ballstage import ball_scene, stage_of_facets
 from benchmarks.watching import STAGES, counted, stage_seconds
 from rig import display, icosphere, viewer
 
-from quiltcli import binning, draw, raster
+from quiltcli import binframe, binning, draw, raster
 from quiltcli.display import Facets
 from quiltcli.draw import Stage, draw_frame, new_buffers
 
@@ -22,8 +22,8 @@ PIXELS = 400_000  # of all facets together, lit or not
 
 PROBES = {
     (binning, "candidate_pairs"): lambda found, *_: {"proposed": found[0].size},
-    (draw, "bin_triangles"): lambda pairs, *_: {"pairs": pairs.facet.size},
-    (draw, "split_pairs"): lambda pairs, *_: {"block pairs": pairs.triangle.size},
+    (binframe, "pairs_of"): lambda pairs, *_: {"pairs": pairs.facet.size},
+    (binframe, "block_keys"): lambda keys, *_: {"block pairs": keys.size},
     (raster, "draw_small"): lambda candidates, *_: {"small": candidates},
     (raster, "draw_large"): lambda evaluated, *_: {"large": evaluated},
     (draw, "block_window"): lambda pixels, buffer, *_: {"bytes": pixels.size * buffer.itemsize},

@@ -26,7 +26,7 @@ ORDER = (
         "progress",
         "diff",
     ),
-    *("draw", "methods", "pool", "outputs", "interrupt", "render"),
+    *("binframe", "draw", "methods", "pool", "outputs", "interrupt", "render"),
     *("verify", "preview", "contact", "video"),
     *("simulate", "view", "compare", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
 )

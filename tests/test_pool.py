@@ -34,7 +34,7 @@ def test_workers_draw_the_same_pixels_as_one_process(stage):
     with Pool(stage, [together], 3) as pool:
         for eye in EYES:
             one = draw_frame(stage, viewer(eye), alone)
-            other = draw_frame(stage, viewer(eye), together, dirty=dirty, run=pool.draw)
+            other = draw_frame(stage, viewer(eye), together, dirty=dirty, crew=pool)
             dirty = np.ones(stage.facets.count, bool)
             assert one.visible_pixels == other.visible_pixels > 1000
             for name in alone:
@@ -47,7 +47,7 @@ def test_more_pairs_than_there_is_room_for_are_drawn_all_the_same(stage, monkeyp
     alone, together = new_buffers(stage), shared_buffers(stage)
     with Pool(stage, [together], 2) as pool:
         draw_frame(stage, viewer(EYES[0]), alone)
-        draw_frame(stage, viewer(EYES[0]), together, run=pool.draw)
+        draw_frame(stage, viewer(EYES[0]), together, crew=pool)
     np.testing.assert_array_equal(alone["Z"], together["Z"])
 
 
@@ -63,7 +63,7 @@ def test_a_dead_worker_is_an_error_that_names_the_frame_and_leaves_nobody(stage)
         os.kill(victim, signal.SIGKILL)
         words = "frame 1: a worker process was killed by signal 9 .out of memory"
         with pytest.raises(CheckFailedError, match=words):
-            draw_frame(stage, viewer(EYES[0]), buffers, run=pool.draw)
+            draw_frame(stage, viewer(EYES[0]), buffers, crew=pool)
     assert children() == before
 
 
@@ -77,7 +77,7 @@ def test_a_fault_in_a_worker_is_told_with_its_traceback(stage, monkeypatch):
         Pool(stage, [buffers], 2) as pool,
         pytest.raises(RuntimeError, match=r"frame 1: a worker failed:[\s\S]*no such thing"),
     ):
-        draw_frame(stage, viewer(EYES[0]), buffers, run=pool.draw)
+        draw_frame(stage, viewer(EYES[0]), buffers, crew=pool)
 
 
 def test_workers_do_not_outlive_a_parent_that_is_killed(stage):

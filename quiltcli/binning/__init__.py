@@ -8,6 +8,7 @@ take part, hidden behind others or not.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,16 @@ from quiltcli.binning.cones import Cones, Parts, facet_parts, lit_cones, overlap
 from quiltcli.binning.cores import facet_cores
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
 
-__all__ = ["Pairs", "Parts", "bin_triangles", "facet_parts", "lit_cones"]
+__all__ = [
+    "Cones",
+    "Pairs",
+    "Parts",
+    "bin_triangles",
+    "core_of_vertices",
+    "facet_parts",
+    "lit_cones",
+    "pairs_of",
+]
 
 _CHUNK = 1 << 17
 
@@ -58,22 +68,29 @@ def bin_triangles(
         eye: (3,) world metres.
     """
     cones = lit_cones(parts, lit, eye)
-    drawn = np.flatnonzero(wanted)
-    corners = triangles[drawn]
-    part = core_of_vertices(vertices, cones)[corners]
-    same = (part[:, 0] == part[:, 1]) & (part[:, 1] == part[:, 2]) & (part[:, 0] >= 0)
-    keys = [_key(cones.facet[part[same, 0]], drawn[same])]
-    keys.extend(_second_pass(vertices, triangles, drawn[~same], cones))
-    found = np.concatenate(keys)
+    core = core_of_vertices(vertices, cones)
+    return pairs_of(vertices, triangles, np.flatnonzero(wanted), core, cones)
+
+
+def pairs_of(
+    vertices: FloatArray, triangles: Int32Array, drawn: IntArray, core: Int32Array, cones: Cones
+) -> Pairs:
+    """As `bin_triangles`, of the triangles with the indices `drawn`, from the `core_of_vertices` (V,)."""
+    a, b, c = core.take(triangles.take(drawn, axis=0).T)
+    same = (a == b) & (b == c) & (a >= 0)
+    settled, rest = np.flatnonzero(same), np.flatnonzero(~same)
+    second = list(_second_pass(vertices, triangles, drawn[rest], cones))
+    found = np.concatenate([_key(cones.facet.take(a[settled]), drawn[settled]), *second])
     found.sort()
     found = found[np.diff(found, prepend=-1) != 0]
-    reaching = np.zeros(len(triangles), dtype=np.bool_)
-    reaching[found & 0xFFFFFFFF] = True
+    triangle = found & 0xFFFFFFFF
+    reaching = np.zeros(int(drawn.max(initial=-1)) + 1, dtype=np.bool_)
+    reaching[triangle] = True
     return Pairs(
         facet=(found >> 32).astype(np.int32),
-        triangle=(found & 0xFFFFFFFF).astype(np.int32),
-        settled=int(same.sum()),
-        reaching=int(reaching.sum()),
+        triangle=triangle.astype(np.int32),
+        settled=settled.size,
+        reaching=int(np.count_nonzero(reaching)),
     )
 
 
@@ -98,16 +115,16 @@ def core_of_vertices(vertices: FloatArray, cones: Cones) -> Int32Array:
     return result
 
 
-def _second_pass(vertices: FloatArray, triangles: Int32Array, rest: IntArray, cones: Cones) -> list[IntArray]:
+def _second_pass(
+    vertices: FloatArray, triangles: Int32Array, rest: IntArray, cones: Cones
+) -> Iterator[IntArray]:
     """Keys of the pairs of the triangles that the first pass left, by the exact cone test."""
-    keys = []
     for at in range(0, rest.size, _CHUNK):
         chunk = rest[at : at + _CHUNK]
         corners = vertices[triangles[chunk]]
         first, second = candidate_pairs(corners, cones.wide)
         meets = overlapping(corners, cones.planes, cones.wide, first, second)
-        keys.append(_key(cones.facet[second[meets]], chunk[first[meets]]))
-    return keys
+        yield _key(cones.facet[second[meets]], chunk[first[meets]])
 
 
 def _key(facet: Int32Array, triangle: IntArray) -> IntArray:

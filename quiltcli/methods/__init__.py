@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from quiltcli.draw import Buffers, Runner, Stage
+from quiltcli.draw import Buffers, Crew, Stage
 from quiltcli.draw import draw_frame as rasterize_frame
 from quiltcli.geometry import BoolArray
 from quiltcli.methods.raycast import cast_frame
@@ -33,10 +33,10 @@ def draw_frame(
     only: BoolArray | None = None,
     *,
     dirty: BoolArray | None = None,
-    run: Runner | None = None,
+    crew: Crew | None = None,
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet, by the job's method; see `draw.draw_frame`."""
     other = OTHERS.get(stage.job.render.method)
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
-    return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, run=run)
+    return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, crew=crew)

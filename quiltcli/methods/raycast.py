@@ -50,8 +50,8 @@ def cast_frame(
     rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
     target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
-    clear(stage, buffers, only, None)
-    lay_background(stage, rays.lit, buffers)
+    clear(stage, buffers, only)
+    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers)
 
     def draw(address: IntArray) -> int:
         pixels = places(address, stage.layout, stage.owners, rays)

@@ -42,7 +42,7 @@ def draw_twice(
     to_picture = picture_from_eye(stage, viewer, lit, size)
     if only is not None:
         lit &= only
-    clear(stage, buffers, only, None)
+    clear(stage, buffers, only)
     visible = 0
     rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
     for address in pixels_of(stage, rays.lit):

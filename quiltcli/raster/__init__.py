@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import OwnerArray
+from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.homography import QuiltRays
 from quiltcli.orders import DepthOrder
 from quiltcli.raster.blocks import Blocks, block_window, cut_batches, cut_blocks, new_canvas, ray_matrices
@@ -23,7 +23,15 @@ from quiltcli.raster.keys import serial_bits
 from quiltcli.raster.large import draw_large
 from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import PlaneTable
-from quiltcli.raster.prewarp import BlockPairs, Sight, block_matrices, split_pairs, warp
+from quiltcli.raster.prewarp import (
+    BlockPairs,
+    Sight,
+    block_keys,
+    block_matrices,
+    pairs_by_block,
+    split_pairs,
+    warp,
+)
 from quiltcli.raster.small import LIMIT, draw_small
 from quiltcli.raster.visibility import read_canvas
 from quiltcli.viewer import Viewer
@@ -36,8 +44,10 @@ __all__ = [
     "Sight",
     "Wanted",
     "batches",
+    "block_keys",
     "block_window",
     "cut_blocks",
+    "pairs_by_block",
     "rasterize",
     "split_pairs",
     "triangles_in_range",
@@ -67,9 +77,14 @@ class Frame:
     order: DepthOrder | None = None
 
 
-def batches(frame: Frame) -> list[tuple[int, int]]:
-    """The frame's work in ranges of blocks; any may be rasterized anywhere, in any order."""
-    return cut_batches(np.diff(frame.pairs.start), frame.blocks)
+def batches(frame: Frame, also: BoolArray | None = None) -> list[tuple[int, int]]:
+    """The frame's work in ranges of blocks; any may be rasterized anywhere, in any order.
+
+    Args:
+        frame: the frame.
+        also: (B,) blocks that must be in some range although they have no pairs.
+    """
+    return cut_batches(np.diff(frame.pairs.start), frame.blocks, also)
 
 
 def rasterize(

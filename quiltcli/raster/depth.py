@@ -67,11 +67,12 @@ class DepthRange:
 
 
 def triangles_in_range(
-    vertices: FloatArray, triangles: Int32Array, viewer: Viewer
+    depth: FloatArray, vertices: FloatArray, triangles: Int32Array, viewer: Viewer
 ) -> tuple[BoolArray, BoolArray]:
     """Which triangles reach into the depths that are drawn, and which also reach out of them.
 
     Args:
+        depth: (V,) depth of the vertices, metres.
         vertices: (V, 3) world minus eye, metres.
         triangles: (T, 3).
         viewer: near, far, and how depth is measured.
@@ -80,8 +81,7 @@ def triangles_in_range(
         inside (T,) and cut (T,); a triangle that is cut needs its fragments tested.
     """
     if viewer.depth == "radial":
-        return _radial_range(vertices, triangles, viewer)
-    depth = dot(vertices, viewer.look)
+        return _radial_range(depth, vertices, triangles, viewer)
     if depth.size and viewer.near <= depth.min() and depth.max() <= viewer.far:
         return np.ones(len(triangles), dtype=np.bool_), np.zeros(len(triangles), dtype=np.bool_)
     nearest, farthest = _least_and_greatest(depth, triangles)
@@ -89,9 +89,11 @@ def triangles_in_range(
     return inside, inside & ((nearest < viewer.near) | (farthest > viewer.far))
 
 
-def _radial_range(vertices: FloatArray, triangles: Int32Array, viewer: Viewer) -> tuple[BoolArray, BoolArray]:
+def _radial_range(
+    distance: FloatArray, vertices: FloatArray, triangles: Int32Array, viewer: Viewer
+) -> tuple[BoolArray, BoolArray]:
     """`triangles_in_range` for distances: the farthest point is a corner, the nearest need not be."""
-    _, farthest = _least_and_greatest(np.sqrt(dot(vertices, vertices)), triangles)
+    _, farthest = _least_and_greatest(distance, triangles)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normal = cross(b - a, c - a)
     length = np.maximum(np.sqrt(dot(normal, normal)), np.finfo(np.float64).tiny)

@@ -64,6 +64,11 @@ def block_matrices(
 
 def split_pairs(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> BlockPairs:
     """Give every pair to the blocks of its facet that the triangle's bounding box touches."""
+    return pairs_by_block(block_keys(pairs, sight, rays, blocks), blocks)
+
+
+def block_keys(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> IntArray:
+    """As `split_pairs`, as numbers block·2³² + triangle, ascending."""
     per_facet = np.diff(blocks.start)
     single = per_facet[pairs.facet] == 1
     block = [blocks.start[pairs.facet[single]]]
@@ -74,9 +79,14 @@ def split_pairs(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> 
         found, owner = _blocks_under(pairs.facet[chunk], pairs.triangle[chunk], sight, rays, blocks)
         block.append(found)
         triangle.append(pairs.triangle[chunk][owner])
-    keys = np.concatenate(block) << 32 | np.concatenate(triangle)
+    keys: IntArray = np.concatenate(block) << 32 | np.concatenate(triangle)
     if rest.size:
         keys.sort()
+    return keys
+
+
+def pairs_by_block(keys: IntArray, blocks: Blocks) -> BlockPairs:
+    """The block pairs of `block_keys`."""
     start = np.searchsorted(keys, np.arange(blocks.facet.size + 1, dtype=np.int64) << 32)
     return BlockPairs(start, (keys & 0xFFFFFFFF).astype(np.int32))
 

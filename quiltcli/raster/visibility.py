@@ -20,7 +20,7 @@ from quiltcli.raster.keys import serial_of, serial_part
 from quiltcli.raster.planes import Planes
 from quiltcli.raster.surfaces import surfaces
 
-_TILES = 1024
+_WHOLE, _PIXELS = 1024, 256  # microtiles at a time
 _DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
 _SOME_DEPTH = np.int64(1) << 62
 
@@ -108,19 +108,19 @@ def read_canvas(
     reader = Reader(canvas, planes, blocks, limits, owners, bits, wanted, row_of_serial, limits.handed)
     serial, complete = _sort_out(reader, tiles)
     whole = np.flatnonzero(serial >= 0)
-    for part in _parts(whole):
+    for part in _parts(whole, _WHOLE):
         yield _whole_tiles(reader, tiles.take(part), serial[part])
-    for part in _parts(np.flatnonzero(complete)):
+    for part in _parts(np.flatnonzero(complete), _PIXELS):
         yield _complete_tiles(reader, tiles.take(part))
-    for part in _parts(np.flatnonzero(~complete & (serial < 0))):
+    for part in _parts(np.flatnonzero(~complete & (serial < 0)), _PIXELS):
         hits = _scattered_pixels(reader, tiles.take(part))
         if hits.first.size:
             yield hits
 
 
-def _parts(rows: IntArray) -> Iterator[IntArray]:
-    for at in range(0, rows.size, _TILES):
-        yield rows[at : at + _TILES]
+def _parts(rows: IntArray, step: int) -> Iterator[IntArray]:
+    for at in range(0, rows.size, step):
+        yield rows[at : at + step]
 
 
 def _drawn_tiles(canvas: Canvas, blocks: Blocks) -> Tiles:

@@ -92,8 +92,7 @@ def _times(stage: Stage, viewer: Viewer, rounds: int, *, rivals: bool) -> Times:
     contestants: dict[str, Callable[[], object]] = {}
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, [buffers], 2)) if can_fork() else None
-        run = pool.draw if pool else None
-        contestants["frame 2"] = partial(draw_frame, stage, viewer, buffers, dirty=dirty, run=run)
+        contestants["frame 2"] = partial(draw_frame, stage, viewer, buffers, dirty=dirty, crew=pool)
         if rivals and not opengl.renderer().startswith("-"):
             quilt = ends.enter_context(opengl.Quilt(stage, frame, culling=False))
             contestants["opengl sorted"] = partial(quilt.draw, "ggx")

@@ -107,7 +107,7 @@ def _ours(
     }
     if can_fork():
         pool = ends.enter_context(Pool(stage, [buffers], 2))
-        contestants[f"{kind} frame 2"] = partial(frame, run=pool.draw)
+        contestants[f"{kind} frame 2"] = partial(frame, crew=pool)
     return contestants
 
 
@@ -147,9 +147,8 @@ def _whole_mesh(place: Place, stage: Stage) -> dict[str, dict[str, list[float]]]
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, [buffers], 2)) if can_fork() else None
         quilt = ends.enter_context(opengl.Quilt(stage, frame, culling=False))
-        run = pool.draw if pool else None
         contestants: Contestants = {
-            "smaller mesh frame 2": lambda: draw_frame(stage, viewer, buffers, dirty=dirty, run=run),
+            "smaller mesh frame 2": lambda: draw_frame(stage, viewer, buffers, dirty=dirty, crew=pool),
             "smaller mesh opengl whole": lambda: quilt.draw("ggx", whole_mesh=True),
         }
         return race(contestants, 3, once=1.0, cold=("smaller mesh opengl whole",))

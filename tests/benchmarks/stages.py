@@ -8,13 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from quiltcli.display import Facets, load_display
-from quiltcli.draw import Buffers, Stage, draw_frame, stage_of
+from quiltcli.binframe import bin_frame
+from quiltcli.display import Facets, lit_facets, load_display
+from quiltcli.draw import Stage, plan_of, stage_of
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.homography import quilt_rays
 from quiltcli.job import JobFile, ResolutionSpec, load_display_file
 from quiltcli.layout import align
 from quiltcli.packing import pack
-from quiltcli.raster import Frame, rasterize
+from quiltcli.raster import Frame, batches, rasterize
+from quiltcli.scene import Scene
+from quiltcli.shading import shading_wants
 from quiltcli.viewer import Viewer
 from tests.benchmarks.meshes import Mesh, scene_of
 from tests.rig import CUBE, CUBE_FACES, display, icosphere, viewer
@@ -99,26 +103,25 @@ def viewer_of(place: Place) -> Viewer:
 class Work:
     """A frame that is binned and waits to be drawn."""
 
+    scene: Scene
     frame: Frame
     batches: Sequence[tuple[int, int]]
 
 
 def binned(stage: Stage, seen_by: Viewer) -> Work:
     """Bin a frame the way `draw_frame` does, and draw nothing."""
-    found: list[Work] = []
-
-    def keep(frame: Frame, batches: Sequence[tuple[int, int]], _: Buffers) -> int:
-        found.append(Work(frame, batches))
-        return 0
-
-    nothing_to_clear = np.zeros(stage.facets.count, dtype=np.bool_)
-    draw_frame(stage, seen_by, {}, dirty=nothing_to_clear, run=keep)
-    return found[0]
+    rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, seen_by.eye), seen_by.eye)
+    found = bin_frame(plan_of(stage, seen_by, rays))
+    frame = Frame(seen_by, found.sight, rays, stage.blocks, found.pairs, stage.owners)
+    return Work(stage.scene, frame, batches(frame))
 
 
 def all_hits(work: Work) -> int:
     """Rasterize every batch; the number of pixels that see the scene."""
-    return sum(hits.pixel.size for batch in work.batches for hits in rasterize(work.frame, batch))
+    wanted = replace(shading_wants(work.scene), position=True, weights=True)
+    return sum(
+        hits.depth.size for batch in work.batches for hits in rasterize(work.frame, batch, wanted=wanted)
+    )
 
 
 def facet_pairs(frame: Frame) -> tuple[Int32Array, IntArray]:

@@ -13,13 +13,13 @@ from contextlib import ExitStack, contextmanager
 from types import GeneratorType
 from typing import Any
 
-from quiltcli import binning, channels, draw, raster
+from quiltcli import binframe, binning, channels, draw, raster
 
 STAGES: tuple[tuple[object, str, str], ...] = (
-    (draw, "bin_triangles", "bin"),
-    (binning, "core_of_vertices", "bin: first pass"),
+    (draw, "bin_frame", "bin"),
+    (binframe, "core_of_vertices", "bin: first pass"),
     (binning, "_second_pass", "bin: second pass"),
-    (draw, "split_pairs", "prewarp"),
+    (binframe, "block_keys", "prewarp"),
     (raster, "warp", "prewarp"),
     (raster, "draw_small", "small triangles"),
     (raster, "draw_large", "large triangles"),
@@ -27,6 +27,7 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (channels, "shade", "shade"),
     (draw, "fill", "store"),
     (draw, "clear", "clear"),
+    (draw, "clear_blocks", "clear"),
 )
 """Module, function, and the stage whose time it is."""
 
