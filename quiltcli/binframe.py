@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.binning import Cones, Parts, core_of_vertices, lit_cones, pairs_of
+from quiltcli.binning import Cones, Cores, Parts, lit_cones, pairs_of
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
 from quiltcli.homography import QuiltRays
 from quiltcli.raster import BlockPairs, Blocks, Sight, block_keys, pairs_by_block, triangles_in_range
@@ -47,6 +47,7 @@ class BinPlan:
         viewer: the viewer.
         rays: rays through the quilt.
         cones: of the lit parts of the display.
+        cores: of the same parts.
         culling: whether triangles that face away are left out.
     """
 
@@ -55,6 +56,7 @@ class BinPlan:
     viewer: Viewer
     rays: QuiltRays
     cones: Cones
+    cores: Cores
     culling: bool
 
 
@@ -93,7 +95,8 @@ def bin_plan(
     scene: Scene, parts: Parts, blocks: Blocks, viewer: Viewer, rays: QuiltRays, *, culling: bool
 ) -> BinPlan:
     """The plan of a frame; `parts` are the convex pieces of the facets, in the world."""
-    return BinPlan(scene, blocks, viewer, rays, lit_cones(parts, rays.lit, viewer.eye), culling)
+    cones = lit_cones(parts, rays.lit, viewer.eye)
+    return BinPlan(scene, blocks, viewer, rays, cones, Cores(cones), culling)
 
 
 def unseen(scene: Scene) -> Seen:
@@ -111,7 +114,7 @@ def see_vertices(plan: BinPlan, part: slice, seen: Seen) -> None:
     """Find out about some of the vertices and write it down."""
     vertices = np.subtract(plan.scene.vertices[part], plan.viewer.eye, out=seen.vertices[part])
     seen.depth[part] = plan.viewer.depth_of(vertices.T)
-    seen.core[part] = core_of_vertices(vertices, plan.cones)
+    seen.core[part] = plan.cores.met_by(vertices)
 
 
 def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
@@ -128,15 +131,15 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     return Share(keys, drawn.size, pairs.reaching, pairs.settled, pairs.facet.size)
 
 
-def join(plan: BinPlan, seen: Seen, shares: Iterable[Share]) -> Binned:
+def join(scene: Scene, blocks: Blocks, seen: Seen, shares: Iterable[Share]) -> Binned:
     """The frame, when all its shares are done."""
     shares = list(shares)
     keys = shares[0].keys if len(shares) == 1 else np.concatenate([share.keys for share in shares])
     if len(shares) > 1:
         keys.sort()
     return Binned(
-        sight=Sight(seen.vertices, plan.scene.triangles, seen.cut),
-        pairs=pairs_by_block(keys, plan.blocks),
+        sight=Sight(seen.vertices, scene.triangles, seen.cut),
+        pairs=pairs_by_block(keys, blocks),
         triangles=sum(share.triangles for share in shares),
         reaching=sum(share.reaching for share in shares),
         settled=sum(share.settled for share in shares),
@@ -148,7 +151,7 @@ def bin_frame(plan: BinPlan) -> Binned:
     """Bin a frame in one share."""
     seen = unseen(plan.scene)
     see_vertices(plan, slice(0, len(seen.vertices)), seen)
-    return join(plan, seen, [bin_share(plan, slice(0, len(seen.cut)), seen)])
+    return join(plan.scene, plan.blocks, seen, [bin_share(plan, slice(0, len(seen.cut)), seen)])
 
 
 def faces_eye(planes: FloatArray, eye: FloatArray) -> BoolArray:

@@ -131,15 +131,12 @@ def fill(
 
 
 def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
-    """As `astype(np.float16)` for numbers from 0 to the largest half float, in a fraction of the time.
+    """Numbers from 0 to the largest half float rounded to half floats, what lies in the middle upward.
 
     A product with 2⁻¹¹² has the exponent of a half float, small ones denormal as theirs are; then the
-    bits that a half float lacks are rounded away, to the nearest and if there are two to the even.
+    bits that a half float lacks are rounded away. `astype` would take five times as long.
     """
     bits = (values * np.float32(2.0**-112)).view(np.uint32)
-    odd = bits >> np.uint32(13)
-    odd &= np.uint32(1)
-    bits += odd
-    bits += np.uint32(0x0FFF)
+    bits += np.uint32(0x1000)
     bits >>= np.uint32(13)
     return bits.astype(np.uint16).view(np.float16)

@@ -217,14 +217,13 @@ class Pool:
         self._share_out(_Item("see", (part,)) for part in self._shares(len(seen.vertices)))
         parts = self._shares(len(seen.cut))
         shares = self._share_out(_Item("bin", (part,)) for part in parts)
-        plan = plan_of(self._stage, viewer, rays)
         if None in shares:
-            return bin_frame(plan)
+            return bin_frame(plan_of(self._stage, viewer, rays))
         found = [
             replace(share, keys=arena.keys_of(part)[:count])
             for (share, count), part in zip(shares, parts, strict=True)
         ]
-        binned = join(plan, seen, found)
+        binned = join(self._stage.scene, self._stage.blocks, seen, found)
         if binned.pairs.triangle.size > arena.triangle.size:
             return binned
         arena.start[:] = binned.pairs.start

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig import CUBE, CUBE_FACES, cube, display, icosphere, panel, viewer
 
-from quiltcli.binning import bin_triangles, cones, core_of_vertices, facet_parts, lit_cones
+from quiltcli.binning import Cores, bin_triangles, cones, facet_parts, lit_cones
 from quiltcli.binning.broad import candidate_pairs, cube_faces
 from quiltcli.binning.cones import cone_planes, overlapping
 from quiltcli.binning.cores import facet_cores
@@ -123,7 +123,7 @@ def test_every_pair_passes_the_exact_test_and_every_triangle_that_does_is_paired
     binned = Binned(*CASES[case], 3)
     exact, found = binned.all_pairs(), binned.keys()
     assert found - exact == set()
-    core = core_of_vertices(binned.vertices, binned.cones)[binned.triangles]
+    core = Cores(binned.cones).met_by(binned.vertices)[binned.triangles]
     settled = {t for t in range(len(core)) if core[t, 0] >= 0 and (core[t] == core[t, 0]).all()}
     ahead = binned.ahead()
     assert {pair for pair in exact - found if ahead[pair]} == set()

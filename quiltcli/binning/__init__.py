@@ -16,14 +16,14 @@ import numpy as np
 from quiltcli.binning.broad import candidate_pairs
 from quiltcli.binning.cones import Cones, Parts, facet_parts, lit_cones, overlapping
 from quiltcli.binning.cores import facet_cores
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
 
 __all__ = [
     "Cones",
+    "Cores",
     "Pairs",
     "Parts",
     "bin_triangles",
-    "core_of_vertices",
     "facet_parts",
     "lit_cones",
     "pairs_of",
@@ -68,14 +68,14 @@ def bin_triangles(
         eye: (3,) world metres.
     """
     cones = lit_cones(parts, lit, eye)
-    core = core_of_vertices(vertices, cones)
+    core = Cores(cones).met_by(vertices)
     return pairs_of(vertices, triangles, np.flatnonzero(wanted), core, cones)
 
 
 def pairs_of(
     vertices: FloatArray, triangles: Int32Array, drawn: IntArray, core: Int32Array, cones: Cones
 ) -> Pairs:
-    """As `bin_triangles`, of the triangles with the indices `drawn`, from the `core_of_vertices` (V,)."""
+    """As `bin_triangles`, of the triangles with the indices `drawn`, from the vertices' cores (V,)."""
     a, b, c = core.take(triangles.take(drawn, axis=0).T)
     same = (a == b) & (b == c) & (a >= 0)
     settled, rest = np.flatnonzero(same), np.flatnonzero(~same)
@@ -94,25 +94,30 @@ def pairs_of(
     )
 
 
-def core_of_vertices(vertices: FloatArray, cones: Cones) -> Int32Array:
-    """The part (V,) whose core the ray from the eye through each vertex meets, −1 for none."""
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
+class Cores:
+    """What the first pass casts rays at: of every lit part, what no other facet overlaps."""
 
-    corners, counts = facet_cores(cones)
-    fans = np.maximum(counts - 2, 0)
-    part = np.repeat(np.arange(fans.size), fans)
-    if not part.size:
-        return np.full(len(vertices), -1, dtype=np.int32)
-    rank = np.arange(part.size) - np.repeat(np.cumsum(fans) - fans, fans)
-    first = part * corners.shape[1]
-    faces = np.stack((first, first + rank + 1, first + rank + 2), axis=1).astype(np.int32)
-    scene = EmbreeScene()
-    TriangleMesh(scene, corners.reshape(-1, 3).astype(np.float32), faces)
-    origin = np.zeros((1, 3), dtype=np.float32)
-    met = scene.run(np.broadcast_to(origin, vertices.shape), vertices.astype(np.float32))
-    result: Int32Array = np.append(part, -1).astype(np.int32)[met]
-    return result
+    def __init__(self, cones: Cones) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        corners, counts = facet_cores(cones)
+        part, rank = segments(np.concatenate(([0], np.cumsum(np.maximum(counts - 2, 0)))))
+        first = part * corners.shape[1]
+        faces = np.stack((first, first + rank + 1, first + rank + 2), axis=1).astype(np.int32)
+        self._part = np.append(part, -1).astype(np.int32)
+        self._scene = EmbreeScene()
+        if part.size:
+            TriangleMesh(self._scene, corners.reshape(-1, 3).astype(np.float32), faces)
+
+    def met_by(self, vertices: FloatArray) -> Int32Array:
+        """The part (V,) whose core the ray from the eye through each vertex (V, 3) meets, −1 for none."""
+        if self._part.size == 1:
+            return np.full(len(vertices), -1, dtype=np.int32)
+        origin = np.zeros((1, 3), dtype=np.float32)
+        met = self._scene.run(np.broadcast_to(origin, vertices.shape), vertices.astype(np.float32))
+        result: Int32Array = self._part.take(met)
+        return result
 
 
 def _second_pass(

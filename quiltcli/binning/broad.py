@@ -24,8 +24,8 @@ class Footprints:
 
     Attributes:
         index: (N,) the polygon.
-        low: (N, 2) least corner.
-        high: (N, 2) greatest corner.
+        low: (2, N) least x and y.
+        high: (2, N) greatest x and y.
     """
 
     index: IntArray
@@ -34,7 +34,7 @@ class Footprints:
 
     def take(self, keep: IntArray) -> Footprints:
         """The rectangles with these indices."""
-        return Footprints(self.index[keep], self.low[keep], self.high[keep])
+        return Footprints(self.index.take(keep), self.low.take(keep, axis=1), self.high.take(keep, axis=1))
 
 
 def cube_faces(towards: FloatArray) -> FloatArray:
@@ -85,13 +85,13 @@ def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> IntA
     movers = grid.within(footprints(polygons, frame))
     result = []
     cells = grid.cells(movers)
-    work = np.cumsum((cells[:, 2] - cells[:, 0] + 1) * (cells[:, 3] - cells[:, 1] + 1))
+    work = np.cumsum(_areas(cells))
     first = 0
     while first < movers.index.size:
         done = work[first - 1] if first else 0
         last = max(int(np.searchsorted(work, done + _CHUNK // 8, side="right")), first + 1)
         part = np.arange(first, last)
-        mover, target = grid.meeting(movers.take(part), cells[part])
+        mover, target = grid.meeting(movers.take(part), cells[:, first:last])
         result.append(movers.index[first + mover] * len(cones) + targets.index[target])
         first = last
     return np.concatenate(result) if result else np.zeros(0, dtype=np.int64)
@@ -107,11 +107,21 @@ def footprints(polygons: FloatArray, frame: FloatArray) -> Footprints:
     front = (w > _NEAR_PLANE * (np.abs(x) + np.abs(y) + np.abs(w))).all(axis=0)
     safe = np.where(front, w, 1.0)
     x, y = x / safe, y / safe
-    low = np.stack((x.min(axis=0), y.min(axis=0)), axis=1)
-    high = np.stack((x.max(axis=0), y.max(axis=0)), axis=1)
-    low[~front], high[~front] = -1.0, 1.0
-    seen = np.flatnonzero((low <= 1).all(axis=1) & (high >= -1).all(axis=1))
-    return Footprints(index[seen], np.maximum(low[seen], -1.0), np.minimum(high[seen], 1.0))
+    low = np.stack((x.min(axis=0), y.min(axis=0)))
+    high = np.stack((x.max(axis=0), y.max(axis=0)))
+    low[:, ~front], high[:, ~front] = -1.0, 1.0
+    seen = np.flatnonzero((low[0] <= 1) & (low[1] <= 1) & (high[0] >= -1) & (high[1] >= -1))
+    prints = Footprints(index, low, high).take(seen)
+    np.maximum(prints.low, -1.0, out=prints.low)
+    np.minimum(prints.high, 1.0, out=prints.high)
+    return prints
+
+
+def _areas(cells: IntArray) -> IntArray:
+    """Number (N,) of cells in boxes (4, N) of first column and row, last column and row."""
+    x0, y0, x1, y1 = cells
+    result: IntArray = (x1 - x0 + 1) * (y1 - y0 + 1)
+    return result
 
 
 class _Grid:
@@ -120,8 +130,8 @@ class _Grid:
     def __init__(self, targets: Footprints) -> None:
         self.targets = targets
         self.side = int(np.clip(2.0 * np.sqrt(targets.index.size), 8, 256))
-        self.low = targets.low.min(axis=0)
-        self.high = targets.high.max(axis=0)
+        self.low = targets.low.min(axis=1)
+        self.high = targets.high.max(axis=1)
         side = self.side
         self.box = self.cells(targets)
         owner, cell = self._enumerate(self.box)
@@ -131,16 +141,19 @@ class _Grid:
 
     def within(self, prints: Footprints) -> Footprints:
         """The rectangles that meet the part of the face that has targets."""
-        inside = (prints.low <= self.high) & (prints.high >= self.low)
-        return prints.take(np.flatnonzero(inside.all(axis=1)))
+        inside = np.ones(prints.index.size, dtype=np.bool_)
+        for axis in range(2):
+            inside &= prints.low[axis] <= self.high[axis]
+            inside &= prints.high[axis] >= self.low[axis]
+        return prints.take(np.flatnonzero(inside))
 
     def cells(self, prints: Footprints) -> IntArray:
-        """First column and row, last column and row (N, 4) of the cells the rectangles touch."""
+        """First column and row, last column and row (4, N) of the cells the rectangles touch."""
         scale = self.side / np.maximum(self.high - self.low, np.finfo(np.float64).tiny)
-        low = np.floor((prints.low - self.low) * scale)
-        high = np.floor((prints.high - self.low) * scale)
-        cells: IntArray = np.clip(np.concatenate((low, high), axis=1), 0, self.side - 1).astype(np.int64)
-        return cells
+        corners = np.stack((prints.low, prints.high)) - self.low[:, None]
+        corners *= scale[:, None]
+        cells: IntArray = np.clip(np.floor(corners, out=corners), 0, self.side - 1).astype(np.int64)
+        return cells.reshape(4, -1)
 
     def meeting(self, movers: Footprints, cells: IntArray) -> tuple[IntArray, IntArray]:
         """Movers and targets whose rectangles overlap, each pair once.
@@ -149,22 +162,27 @@ class _Grid:
         greater of the two least corners, which is unique.
         """
         owner, cell = self._enumerate(cells)
-        counts = self.start[cell + 1] - self.start[cell]
+        first = self.start[cell]
+        counts = self.start[cell + 1] - first
         visit, rank = segments(np.concatenate(([0], np.cumsum(counts))))
-        mover, target = owner[visit], self.members[self.start[cell[visit]] + rank]
-        first = np.maximum(cells[mover, :2], self.box[target, :2])
-        here = np.flatnonzero(cell[visit] == first[:, 1] * self.side + first[:, 0])
-        mover, target = mover[here], target[here]
-        apart = (movers.low[mover] > self.targets.high[target]) | (
-            self.targets.low[target] > movers.high[mover]
-        )
-        meets = np.flatnonzero(~apart.any(axis=1))
-        return mover[meets], target[meets]
+        rank += first.take(visit)
+        mover, target, cell = owner.take(visit), self.members.take(rank), cell.take(visit)
+        meets = np.ones(mover.size, dtype=np.bool_)
+        for axis in range(2):
+            meets &= movers.low[axis].take(mover) <= self.targets.high[axis].take(target)
+            meets &= self.targets.low[axis].take(target) <= movers.high[axis].take(mover)
+        keep = np.flatnonzero(meets)
+        mover, target, cell = mover.take(keep), target.take(keep), cell.take(keep)
+        column, row = (np.maximum(cells[k].take(mover), self.box[k].take(target)) for k in (0, 1))
+        here = np.flatnonzero(cell == row * self.side + column)
+        return mover.take(here), target.take(here)
 
     def _enumerate(self, cells: IntArray) -> tuple[IntArray, IntArray]:
-        """Every cell of every box: the box and the cell's number."""
-        across = cells[:, 2] - cells[:, 0] + 1
-        owner, rank = segments(np.concatenate(([0], np.cumsum(across * (cells[:, 3] - cells[:, 1] + 1)))))
-        column = cells[owner, 0] + rank % across[owner]
-        row = cells[owner, 1] + rank // across[owner]
-        return owner, row * self.side + column
+        """Every cell of every box (4, N): the box and the cell's number."""
+        x0, y0, x1, _ = cells
+        areas = _areas(cells)
+        if areas.size and int(areas.max()) == 1:
+            return np.arange(areas.size), y0 * self.side + x0
+        owner, rank = segments(np.concatenate(([0], np.cumsum(areas))))
+        row, column = np.divmod(rank, (x1 - x0 + 1).take(owner))
+        return owner, (y0.take(owner) + row) * self.side + x0.take(owner) + column

@@ -115,9 +115,10 @@ def rasterize(
     matrices = block_matrices(frame.rays, frame.blocks, block, sample)
     pairs = warp(frame.sight, frame.pairs, frame.blocks, block, matrices)
     table = PlaneTable(pairs.triangle.size)
-    extent = np.maximum(pairs.box[1] - pairs.box[0], pairs.box[3] - pairs.box[2])
-    draw_small(pairs.take(np.flatnonzero(extent < LIMIT)), table, canvas, limits, bits, by)
+    width, height = pairs.box[1] - pairs.box[0], pairs.box[3] - pairs.box[2]
+    some = np.minimum(width, height) >= 0
+    small = np.maximum(width, height) < LIMIT
+    draw_small(pairs, np.flatnonzero(some & small), table, canvas, limits, bits, by)
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
-    large = table.add(pairs.take(np.flatnonzero(extent >= LIMIT)))
-    draw_large(large, canvas, limits, bits, by)
-    yield from read_canvas(canvas, table.planes, frame.blocks, limits, frame.owners, bits, wanted or Wanted())
+    draw_large(table.add(pairs, np.flatnonzero(some & ~small)).compact(), canvas, limits, bits, by)
+    yield from read_canvas(canvas, table, frame.blocks, limits, frame.owners, bits, wanted or Wanted())

@@ -74,9 +74,11 @@ class Hits:
         return result
 
     def put(self, buffer: NDArray[Any], values: NDArray[Any]) -> None:
-        """Write values (G, k), or (G, 1) for whole groups, into a flat buffer, rounded to its type."""
+        """Write values (G, k), (G, 1) for whole groups, or (1, 1) for all, into a flat buffer of any type."""
         values = values.astype(buffer.dtype, copy=False)
-        if values.shape != self.depth.shape:
+        if values.size == 1:
+            values = np.broadcast_to(values, (1, self.run))
+        elif values.shape != self.depth.shape:
             values = np.broadcast_to(values, self.depth.shape)
         if self.run == 1:
             buffer[self.first] = values.reshape(-1)

@@ -9,7 +9,7 @@ pixels at a time, one pair a microtile and round, so that no two writes of a rou
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +70,7 @@ class Spans:
 
     def take(self, keep: IntArray) -> Spans:
         """The combinations with these indices."""
-        return Spans(*(getattr(self, field.name).take(keep) for field in fields(Spans)))
+        return Spans(*(column.take(keep) for column in vars(self).values()))
 
 
 def draw_large(
@@ -173,7 +173,7 @@ def _spans(planes: Planes, pieces: Pieces, canvas: Canvas) -> Spans:
         for at in range(first, last, step):
             part = order[at : min(at + step, last)]
             found.append(_class_spans(planes, pieces.row[part], pieces.box[:, part], shape, canvas))
-    columns = zip(*([getattr(spans, field.name) for field in fields(Spans)] for spans in found), strict=True)
+    columns = zip(*(vars(spans).values() for spans in found), strict=True)
     return Spans(*(np.concatenate(column) for column in columns)) if found else _no_spans()
 
 

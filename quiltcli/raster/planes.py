@@ -26,34 +26,22 @@ _TINY = 1e-300
 
 @dataclass(frozen=True)
 class Warped:
-    """N block pairs in the homogeneous pixels of their blocks.
+    """N block pairs, by (block, triangle), in the homogeneous pixels of their blocks.
 
     Attributes:
         triangle: (N,) triangle index.
         block: (N,) place of the block in the batch.
-        serial: (N,) rank of the pair by (block, triangle); the lower wins equal depths.
         corners: (3, 3, N) homogeneous pixels [corner, X/Y/W].
-        box: (4, N) first and last pixel column, first and last row of the bounding box.
+        box: (4, N) first and last pixel column, first and last row of the bounding box; no pixel can be
+            covered where a last is less than its first.
         cut: (N,) triangles that reach beyond the near or far depth.
     """
 
     triangle: Int32Array
     block: Int32Array
-    serial: Int32Array
     corners: FloatArray
     box: Int32Array
     cut: BoolArray
-
-    def take(self, rows: IntArray) -> Warped:
-        """The pairs with these indices, in their order."""
-        return Warped(
-            triangle=self.triangle.take(rows),
-            block=self.block.take(rows),
-            serial=self.serial.take(rows),
-            corners=np.take(self.corners, rows, axis=2),
-            box=np.take(self.box, rows, axis=1),
-            cut=self.cut.take(rows),
-        )
 
 
 @dataclass(frozen=True)
@@ -86,26 +74,25 @@ class Planes:
 
     def __getitem__(self, part: slice) -> Planes:
         """A range of the pairs, as views."""
-        return Planes(
-            self.triangle[part],
-            self.block[part],
-            self.serial[part],
-            self.edge[:, :, part],
-            self.inverse[:, part],
-            self.turn[part],
-            self.low[part],
-            self.high[part],
-            self.box[:, part],
-            self.cut[part],
-        )
+        return Planes(*(column[..., part] for column in vars(self).values()))
+
+    def compact(self) -> Planes:
+        """The same in memory of their own: `take` copies all of an array that has gaps, each time."""
+        return Planes(*(np.ascontiguousarray(column) for column in vars(self).values()))
 
 
 class PlaneTable:
-    """Memory for the planes of a batch, filled as its pairs are drawn and read when all are."""
+    """Memory for the planes of a batch, filled as its pairs are drawn and read when all are.
+
+    Attributes:
+        planes: those of all pairs that were added, and meaningless rows behind them.
+        row_of_serial: (N,) row of every pair that was added, by its serial.
+    """
 
     def __init__(self, capacity: int) -> None:
-        self.filled = 0
-        self._all = Planes(
+        self._filled = 0
+        self.row_of_serial = np.empty(capacity, dtype=np.int64)
+        self.planes = Planes(
             triangle=np.empty(capacity, dtype=np.int32),
             block=np.empty(capacity, dtype=np.int32),
             serial=np.empty(capacity, dtype=np.int32),
@@ -118,33 +105,32 @@ class PlaneTable:
             cut=np.empty(capacity, dtype=np.bool_),
         )
 
-    @property
-    def planes(self) -> Planes:
-        """All planes so far."""
-        return self._all[: self.filled]
-
-    def add(self, pairs: Warped) -> Planes:
-        """Set up these pairs in the table's next rows; a triangle seen edge-on covers nothing."""
-        rows = self._all[self.filled : self.filled + pairs.triangle.size]
-        self.filled += pairs.triangle.size
-        rows.triangle[:], rows.block[:], rows.serial[:] = pairs.triangle, pairs.block, pairs.serial
-        rows.box[:], rows.cut[:] = pairs.box, pairs.cut
-        edge_planes(pairs.corners, rows.edge, rows.inverse, rows.turn)
-        rows.low[:], rows.high[:] = depth_bounds(pairs.corners[:, 2])
+    def add(self, pairs: Warped, chosen: IntArray) -> Planes:
+        """Set up the `chosen` pairs in the table's next rows; a triangle seen edge-on covers nothing."""
+        first, self._filled = self._filled, self._filled + chosen.size
+        rows = self.planes[first : self._filled]
+        self.row_of_serial[chosen] = np.arange(first, self._filled)
+        rows.serial[:] = chosen
+        for name in ("triangle", "block", "cut"):
+            np.take(getattr(pairs, name), chosen, out=getattr(rows, name), mode="clip")
+        np.take(pairs.box, chosen, axis=1, out=rows.box, mode="clip")
+        corners = np.take(pairs.corners, chosen, axis=2)
+        edge_planes(corners, rows.edge, rows.inverse, rows.turn)
+        rows.low[:], rows.high[:] = depth_bounds(corners[:, 2])
         return rows
 
 
-def project(corners: FloatArray, matrix: FloatArray) -> FloatArray:
+def project(corners: FloatArray, matrix: FloatArray, result: FloatArray) -> FloatArray:
     """Homogeneous pixels of triangle corners, each sum in the same order for every triangle.
 
     Args:
         corners: (3, 3, N) [corner, axis] minus the eye, metres.
         matrix: (3, 3, N) rows give X, Y, W.
+        result: (3, 3, N) is given them [corner, X/Y/W].
 
     Returns:
-        (3, 3, N) [corner, X/Y/W].
+        `result`.
     """
-    result = np.empty_like(corners)
     x, y, z = corners[:, 0], corners[:, 1], corners[:, 2]
     part = np.empty_like(x)
     for row in range(3):

@@ -100,7 +100,8 @@ def _blocks_under(
     width = blocks.x0[last] + blocks.width[last] - blocks.x0[first]
     height = blocks.y0[last] + blocks.height[last] - blocks.y0[first]
     corners = gather_corners(sight.vertices, sight.triangles[triangle])
-    box = pixel_boxes(project(corners, np.ascontiguousarray(matrix.transpose(1, 2, 0))), width, height)
+    homogeneous = project(corners, np.ascontiguousarray(matrix.transpose(1, 2, 0)), np.empty_like(corners))
+    box = pixel_boxes(homogeneous, width, height)
     box[0::2] -= 1  # samples may lie half a pixel beside the centre
     box[1::2] += 1
     limit = np.stack((width - 1, height - 1))
@@ -122,7 +123,7 @@ def warp(
     block: IntArray,
     matrices: FloatArray,
 ) -> Warped:
-    """The pairs of some blocks in homogeneous pixels, without those whose boxes hold no pixel.
+    """The pairs of some blocks in homogeneous pixels, in the order of `block_pairs`.
 
     Args:
         sight: the scene from the eye.
@@ -136,34 +137,12 @@ def warp(
     triangle = block_pairs.triangle.take(block_pairs.start[block].take(place) + rank)
     matrices = np.ascontiguousarray(matrices.transpose(1, 2, 0))
     extent = blocks.width[block].astype(np.float64), blocks.height[block].astype(np.float64)
-    room = Warped(
-        triangle=np.empty(place.size, dtype=np.int32),
-        block=np.empty(place.size, dtype=np.int32),
-        serial=np.empty(place.size, dtype=np.int32),
-        corners=np.empty((3, 3, place.size)),
-        box=np.empty((4, place.size), dtype=np.int32),
-        cut=np.empty(place.size, dtype=np.bool_),
-    )
-    filled = 0
+    corners = np.empty((3, 3, place.size))
+    box = np.empty((4, place.size), dtype=np.int32)
     for at in range(0, place.size, _CHUNK):
         part = slice(at, at + _CHUNK)
-        corners = gather_corners(sight.vertices, sight.triangles.take(triangle[part], axis=0))
-        homogeneous = project(corners, np.take(matrices, place[part], axis=2))
-        box = pixel_boxes(homogeneous, *(size.take(place[part]) for size in extent))
-        alive = np.flatnonzero((box[0] <= box[1]) & (box[2] <= box[3]))
-        rows = slice(filled, filled + alive.size)
-        room.triangle[rows] = triangle[part].take(alive)
-        room.block[rows] = place[part].take(alive)
-        room.serial[rows] = alive + at
-        room.corners[:, :, rows] = np.take(homogeneous, alive, axis=2)
-        room.box[:, rows] = np.take(box, alive, axis=1)
-        filled = rows.stop
-    np.take(sight.cut, room.triangle[:filled], out=room.cut[:filled], mode="clip")
-    return Warped(
-        room.triangle[:filled],
-        room.block[:filled],
-        room.serial[:filled],
-        room.corners[:, :, :filled],
-        room.box[:, :filled],
-        room.cut[:filled],
-    )
+        world = gather_corners(sight.vertices, sight.triangles.take(triangle[part], axis=0))
+        project(world, np.take(matrices, place[part], axis=2), corners[:, :, part])
+        width, height = (size.take(place[part]) for size in extent)
+        box[:, part] = pixel_boxes(corners[:, :, part], width, height)
+    return Warped(triangle, place.astype(np.int32), corners, box, sight.cut.take(triangle))

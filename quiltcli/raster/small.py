@@ -28,35 +28,34 @@ _SHAPES = len(SIZES) ** 2
 _CLASS_OF = np.searchsorted(np.asarray(SIZES), np.arange(LIMIT + 1)).astype(np.uint16)
 
 
-def size_classes(pairs: Warped) -> NDArray[np.uint16]:
-    """Class (N,) of every box: its shape, and whether depth must be tested; boxes ≤ LIMIT only."""
-    first_x, last_x, first_y, last_y = pairs.box
-    width, height = last_x - first_x + 1, last_y - first_y + 1
-    classes: NDArray[np.uint16] = _CLASS_OF[height] * np.uint16(len(SIZES)) + _CLASS_OF[width]
-    classes += pairs.cut * np.uint16(_SHAPES)
+def size_classes(pairs: Warped, rows: IntArray) -> NDArray[np.uint16]:
+    """Class (R,) of the boxes of some pairs: their shape, and whether depth must be tested."""
+    first_x, last_x, first_y, last_y = np.take(pairs.box, rows, axis=1)
+    classes: NDArray[np.uint16] = _CLASS_OF.take(last_y - first_y + 1) * np.uint16(len(SIZES))
+    classes += _CLASS_OF.take(last_x - first_x + 1)
+    classes += pairs.cut.take(rows) * np.uint16(_SHAPES)
     return classes
 
 
-def seen_from_behind(pairs: Warped, handed: FloatArray) -> BoolArray:
-    """Pairs (N,) whose winding the eye sees clockwise; never those that reach behind the eye.
-
-    Only the order of drawing depends on it, so corners may be rounded.
+def seen_from_behind(corners: FloatArray, handed: FloatArray) -> BoolArray:
+    """Which triangles' winding the eye sees clockwise; only the order of drawing depends on it.
 
     Args:
-        pairs: pairs in homogeneous pixels.
-        handed: (K,) sign of the determinant of every block's matrix.
+        corners: (3, 3, N) homogeneous pixels [corner, X/Y/W].
+        handed: (N,) sign of the determinant of the blocks' matrices.
     """
-    x, y, w = pairs.corners.transpose(1, 0, 2)
-    front = w.min(axis=0) > 0
-    scale = np.reciprocal(np.where(front, w, 1.0))
-    x, y = x * scale, y * scale
-    area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
-    result: BoolArray = front & (area * handed.take(pairs.block) > 0)
+    (x0, y0, w0), (x1, y1, w1), (x2, y2, w2) = corners
+    determinant = x0 * (y1 * w2 - w1 * y2)
+    determinant += y0 * (w1 * x2 - x1 * w2)
+    determinant += w0 * (x1 * y2 - y1 * x2)
+    determinant *= handed
+    result: BoolArray = determinant > 0
     return result
 
 
 def draw_small(
     pairs: Warped,
+    rows: IntArray,
     table: PlaneTable,
     canvas: Canvas,
     limits: DepthRange,
@@ -66,7 +65,8 @@ def draw_small(
     """Draw pairs whose boxes are at most LIMIT pixels wide and high.
 
     Args:
-        pairs: the pairs.
+        pairs: all pairs of the batch.
+        rows: those to draw.
         table: is given their planes.
         canvas: its keys are raised to the nearest surface.
         limits: near and far, for pairs that reach beyond them.
@@ -76,21 +76,20 @@ def draw_small(
     Returns:
         Number of candidate pixels that were evaluated.
     """
-    classes = size_classes(pairs)
-    behind = seen_from_behind(pairs, limits.handed)
+    classes = size_classes(pairs, rows)
+    behind = seen_from_behind(pairs.corners, limits.handed.take(pairs.block)).take(rows)
     order = np.argsort(classes + behind * np.uint16(2 * _SHAPES), kind="stable")
     turn = order.size - int(np.count_nonzero(behind))
     candidates = 0
     for part in _slices(0, turn, _RUN):
-        candidates += _draw_run(
-            table.add(pairs.take(order[part])), classes[order[part]], canvas, limits, bits, by
-        )
+        run = order[part]
+        candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by)
     nearest = canvas.keys.min(axis=1) if by is None and turn < order.size else None
     for part in _slices(turn, order.size, _RUN):
         run = order[part]
         if nearest is not None:
-            run = run[~_hidden(pairs, run, nearest, canvas, bits)]
-        candidates += _draw_run(table.add(pairs.take(run)), classes[run], canvas, limits, bits, by)
+            run = run[~_hidden(pairs, rows[run], nearest, canvas, bits)]
+        candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by)
     return candidates
 
 
@@ -113,7 +112,7 @@ def _hidden(pairs: Warped, rows: IntArray, nearest: IntArray, canvas: Canvas, bi
     block = pairs.block.take(rows)
     x0, x1, y0, y1 = (np.take(pairs.box, rows, axis=1) >> 3).astype(np.int64)
     across, start = canvas.tiles_across.take(block), canvas.tile_start.take(block)
-    _, high = depth_bounds(np.take(pairs.corners[:, 2], rows, axis=1))
+    _, high = depth_bounds(np.stack([corner[2].take(rows) for corner in pairs.corners]))
     front = high.view(np.int64) | np.int64((1 << bits) - 1)
     upper, lower = start + y0 * across, start + y1 * across
     least = np.minimum(nearest.take(upper + x0), nearest.take(upper + x1))

@@ -17,7 +17,7 @@ from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.hits import BASIS, RUN, Hits, Wanted, exact_values, vector_values
 from quiltcli.raster.keys import serial_of, serial_part
-from quiltcli.raster.planes import Planes
+from quiltcli.raster.planes import PlaneTable
 from quiltcli.raster.surfaces import surfaces
 
 _WHOLE, _PIXELS = 1024, 256  # microtiles at a time
@@ -67,22 +67,21 @@ class Tiles:
 
 @dataclass(frozen=True)
 class Reader:
-    """What is needed to read a canvas; `read_canvas` says what its attributes are."""
+    """What is needed to read a canvas; `read_canvas` says what its attributes are, `surfaces` the last."""
 
     canvas: Canvas
-    planes: Planes
+    table: PlaneTable
     blocks: Blocks
     limits: DepthRange
     owners: OwnerArray
     bits: int
     wanted: Wanted
-    row_of_serial: IntArray
     handed: FloatArray
 
 
 def read_canvas(
     canvas: Canvas,
-    planes: Planes,
+    table: PlaneTable,
     blocks: Blocks,
     limits: DepthRange,
     owners: OwnerArray,
@@ -93,7 +92,7 @@ def read_canvas(
 
     Args:
         canvas: what was drawn.
-        planes: of all pairs that were.
+        table: the planes of all pairs that were.
         blocks: the blocks.
         limits: how depth is measured, with the rays of the canvas's blocks.
         owners: who owns each quilt pixel; keys outside their facet and its bleed are dropped.
@@ -103,9 +102,7 @@ def read_canvas(
     tiles = _drawn_tiles(canvas, blocks)
     if not tiles.index.size:
         return
-    row_of_serial = np.empty(int(planes.serial.max()) + 1, dtype=np.int64)
-    row_of_serial[planes.serial] = np.arange(planes.serial.size)
-    reader = Reader(canvas, planes, blocks, limits, owners, bits, wanted, row_of_serial, limits.handed)
+    reader = Reader(canvas, table, blocks, limits, owners, bits, wanted, limits.handed)
     serial, complete = _sort_out(reader, tiles)
     whole = np.flatnonzero(serial >= 0)
     for part in _parts(whole, _WHOLE):
@@ -170,7 +167,7 @@ def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
 def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray) -> Hits:
     """Hits of microtiles (G,) that are filled by one pair each."""
     wanted = reader.wanted
-    seen = surfaces(reader.planes, reader.row_of_serial[serial], wanted, reader.handed)
+    seen = surfaces(reader.table.planes, reader.table.row_of_serial[serial], wanted, reader.handed)
     inverse = exact_values(tiles.local(seen.inverse))
     ray, depth, position = _rays(reader, tiles)
     depth /= inverse
@@ -250,8 +247,9 @@ def _pixels(
     """
     if pixel is None:
         pixel = np.arange(keys.size)
-    row, which = _distinct(reader.row_of_serial.take(serial_of(keys, reader.bits)), reader.planes.serial.size)
-    seen = surfaces(reader.planes, row, reader.wanted, reader.handed)
+    table = reader.table
+    serial, which = _distinct(serial_of(keys, reader.bits), table.row_of_serial.size)
+    seen = surfaces(table.planes, table.row_of_serial.take(serial), reader.wanted, reader.handed)
     numbers = seen.numbers.take(which, axis=0)
     x = (tiles.x[:, None] + _DX).reshape(-1).take(pixel).astype(np.float64)
     y = (tiles.y[:, None] + _DY).reshape(-1).take(pixel).astype(np.float64)

@@ -17,7 +17,7 @@ from quiltcli import binframe, binning, channels, draw, raster
 
 STAGES: tuple[tuple[object, str, str], ...] = (
     (draw, "bin_frame", "bin"),
-    (binframe, "core_of_vertices", "bin: first pass"),
+    (binframe, "see_vertices", "bin: first pass"),
     (binning, "_second_pass", "bin: second pass"),
     (binframe, "block_keys", "prewarp"),
     (raster, "warp", "prewarp"),
