@@ -50,7 +50,8 @@ class Hits:
         triangle: (G,) triangle index.
         ray: (3, G, k) direction from the eye to the point that is seen, world axes, of any length.
         depth: (G, k) the point's depth as the viewer measures it, metres.
-        normal: (3, G, k) interpolated normal on the side of the eye, of any length; None unless wanted.
+        normal: (3, G, k) interpolated normal on the side of the eye, of any length, or (3, G, 1) where
+            each group has one; None unless wanted.
         weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
         position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
         inside: how many of the pixels lie in their facet's polygon, not in its bleed.

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.raster.blocks import SIDE
 from quiltcli.raster.hits import Wanted
 from quiltcli.raster.planes import Planes, power_of_two
@@ -57,8 +57,7 @@ def surfaces(planes: Planes, rows: IntArray, wanted: Wanted, handed: FloatArray)
     total += edge[2]
     normal = weights = np.zeros((0, 3, rows.size))
     if wanted.normals is not None:
-        # A triangle whose determinant has the other sign is seen from behind.
-        facing = planes.turn.take(rows) * -handed.take(planes.block.take(rows))
+        facing = _facing(planes, rows, handed)
         total *= facing
         edge *= facing
         normal = _normals(wanted.normals, triangle, total, edge)
@@ -71,6 +70,23 @@ def surfaces(planes: Planes, rows: IntArray, wanted: Wanted, handed: FloatArray)
         normal=normal,
         weights=weights,
     )
+
+
+def _facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
+    """1 for pairs (n,) whose triangle's front the eye sees, −1 for those it sees from behind."""
+    result: FloatArray = planes.turn.take(rows) * -handed.take(planes.block.take(rows))
+    return result
+
+
+def has_one_normal(table: Float32Array, triangle: Int32Array) -> BoolArray:
+    """Which triangles (n,) have the same normal at all corners, by the scene's `corner_normals`."""
+    return np.asarray(~table.take(triangle, axis=0)[:, 3:9].any(axis=1))
+
+
+def one_normal(table: Float32Array, planes: Planes, rows: IntArray, handed: FloatArray) -> Float32Array:
+    """The normals (3, n, 1), on the side of the eye, of pairs whose triangles have one each."""
+    normal = table.take(planes.triangle.take(rows), axis=0).T[0:3] * _facing(planes, rows, handed)
+    return normal.astype(np.float32)[:, :, None]
 
 
 def _normals(table: Float32Array, triangle: Int32Array, total: FloatArray, edge: FloatArray) -> FloatArray:

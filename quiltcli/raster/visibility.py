@@ -8,7 +8,7 @@ something, they are handed on in runs of neighbours all the same, for those are 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.hits import BASIS, RUN, Hits, Wanted, exact_values, vector_values
 from quiltcli.raster.keys import serial_of, serial_part
 from quiltcli.raster.planes import PlaneTable
-from quiltcli.raster.surfaces import surfaces
+from quiltcli.raster.surfaces import has_one_normal, one_normal, surfaces
 
 _WHOLE, _PIXELS = 1024, 256  # microtiles at a time
 _DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
@@ -105,8 +105,10 @@ def read_canvas(
     reader = Reader(canvas, table, blocks, limits, owners, bits, wanted, limits.handed)
     serial, complete = _sort_out(reader, tiles)
     whole = np.flatnonzero(serial >= 0)
-    for part in _parts(whole, _WHOLE):
-        yield _whole_tiles(reader, tiles.take(part), serial[part])
+    is_even = _even(reader, serial[whole])
+    for even in (True, False):
+        for part in _parts(whole[is_even == even], _WHOLE):
+            yield _whole_tiles(reader, tiles.take(part), serial[part], even=even)
     for part in _parts(np.flatnonzero(complete), _PIXELS):
         yield _complete_tiles(reader, tiles.take(part))
     for part in _parts(np.flatnonzero(~complete & (serial < 0)), _PIXELS):
@@ -164,10 +166,26 @@ def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
     return serial, complete
 
 
-def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray) -> Hits:
-    """Hits of microtiles (G,) that are filled by one pair each."""
-    wanted = reader.wanted
-    seen = surfaces(reader.table.planes, reader.table.row_of_serial[serial], wanted, reader.handed)
+def _even(reader: Reader, serial: IntArray) -> BoolArray:
+    """Which pairs' triangles have one normal all over; none where no normals are wanted."""
+    if reader.wanted.normals is None:
+        return np.zeros(serial.size, dtype=np.bool_)
+    table = reader.table
+    triangle = table.planes.triangle.take(table.row_of_serial.take(serial))
+    return has_one_normal(reader.wanted.normals, triangle)
+
+
+def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
+    """Hits of microtiles (G,) that are filled by one pair each; `even` where each pair has one normal."""
+    planes, wanted = reader.table.planes, reader.wanted
+    rows = reader.table.row_of_serial.take(serial)
+    normal = None
+    if even and wanted.normals is not None:
+        normal = one_normal(wanted.normals, planes, rows, reader.handed)
+        wanted = replace(wanted, normals=None)
+    seen = surfaces(planes, rows, wanted, reader.handed)
+    if wanted.normals is not None:
+        normal = vector_values(tiles.local(seen.normal))
     inverse = exact_values(tiles.local(seen.inverse))
     ray, depth, position = _rays(reader, tiles)
     depth /= inverse
@@ -182,7 +200,7 @@ def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray) -> Hits:
         triangle=seen.triangle,
         ray=ray,
         depth=depth,
-        normal=None if wanted.normals is None else vector_values(tiles.local(seen.normal)),
+        normal=normal,
         weights=weights,
         position=None if position is None else position / inverse,
         inside=depth.size,
