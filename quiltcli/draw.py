@@ -169,7 +169,8 @@ def draw_frame(
         buffers: from `new_buffers`; overwritten where facets are drawn, emptied elsewhere.
         threads: batches drawn at a time; the pixels do not depend on it.
         only: (F,) facets to draw; the pixels of all others are left as they are.
-        dirty: (F,) facets whose pixels may hold something; all, where it is not known.
+        dirty: (B,) blocks whose pixels may hold something, changed to those that do after this frame;
+            all, where it is not known.
         crew: does the work instead of threads.
 
     Returns:
@@ -185,13 +186,17 @@ def draw_frame(
         binned = crew.bin(viewer, rays)
     with clock.stage("clear"):
         if only is None and dirty is not None:
-            crew.clear(np.flatnonzero(dirty[stage.blocks.facet]), buffers)
+            crew.clear(np.flatnonzero(dirty), buffers)
         else:
             clear(stage, buffers, only)
     with clock.stage("rasterize and shade"):
         frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs, stage.owners)
-        backed = rays.lit[stage.blocks.facet] if has_background(stage) else None
-        visible = crew.draw(frame, batches(frame, backed), buffers)
+        written = np.diff(frame.pairs.start) > 0
+        if has_background(stage):
+            written |= rays.lit[stage.blocks.facet]
+        visible = crew.draw(frame, batches(frame, written), buffers)
+        if dirty is not None:
+            dirty[:] = written if only is None else dirty | written
     return FrameRecord(
         frame=viewer.frame,
         triangles=binned.triangles,

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.display import lit_facets, pitch_mm
+from quiltcli.display import pitch_mm
 from quiltcli.draw import Buffers, Stage, default_threads, new_buffers, set_stage
 from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, raise_all
 from quiltcli.exr import use_threads
@@ -168,7 +168,7 @@ def render_frames(
         listener.begin(len(viewers))
         request = ends.enter_context(stop_between_frames())
         writer = ends.enter_context(Writer(ready, threads, listener, start))
-        dirty = [np.zeros(stage.facets.count, dtype=np.bool_) for _ in sheets]
+        dirty = [np.zeros(stage.blocks.facet.size, dtype=np.bool_) for _ in sheets]
         for number, viewer in enumerate(viewers):
             request.check()
             turn = number % len(sheets)
@@ -178,7 +178,6 @@ def render_frames(
             record = draw_frame(
                 stage, viewer, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool
             )
-            dirty[turn] = lit_facets(stage.facets, viewer.eye)
             writer.take(record, viewer, sheets[turn])
         writer.leave(0)
         request.check()

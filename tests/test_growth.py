@@ -37,7 +37,7 @@ PROBES = {
 def done(stage: Stage) -> Counter[str]:
     """Counts of one frame into empty buffers."""
     buffers = new_buffers(stage)
-    clean = np.zeros(stage.facets.count, bool)
+    clean = np.zeros(stage.blocks.facet.size, bool)
     with counted(PROBES) as counts:
         draw_frame(stage, EYE, buffers, dirty=clean)
     counts["evaluated"] = counts["small"] + counts["large"]
@@ -148,11 +148,12 @@ def test_unlit_facets_cost_nothing():
 def test_only_what_was_drawn_is_cleared():
     stage = stage_of_facets(lit_and_dark(40), ball_scene(3))
     buffers = new_buffers(stage)
-    drawn = np.arange(stage.facets.count) == 0
+    drawn_before = stage.blocks.facet == 3  # behind the wall: nothing will be drawn there
     with counted(PROBES) as counts:
-        draw_frame(stage, EYE, buffers, dirty=drawn)
-    rectangle = int((stage.blocks.width * stage.blocks.height)[0])
+        draw_frame(stage, EYE, buffers, dirty=(drawn := drawn_before.copy()))
+    rectangle = int((stage.blocks.width * stage.blocks.height)[drawn_before].sum())
     assert counts["bytes"] == 12 * (rectangle + counts["hits"])
+    assert np.flatnonzero(drawn).tolist() == np.flatnonzero(stage.blocks.facet == 0).tolist()
 
 
 def test_culled_triangles_are_neither_binned_nor_drawn():

@@ -30,12 +30,11 @@ def stage():
 
 def test_workers_draw_the_same_pixels_as_one_process(stage):
     alone, together = new_buffers(stage), shared_buffers(stage)
-    dirty = np.zeros(stage.facets.count, bool)
+    dirty = np.zeros(stage.blocks.facet.size, bool)
     with Pool(stage, [together], 3) as pool:
         for eye in EYES:
             one = draw_frame(stage, viewer(eye), alone)
             other = draw_frame(stage, viewer(eye), together, dirty=dirty, crew=pool)
-            dirty = np.ones(stage.facets.count, bool)
             assert one.visible_pixels == other.visible_pixels > 1000
             for name in alone:
                 np.testing.assert_array_equal(alone[name], together[name], err_msg=name)

@@ -77,14 +77,15 @@ class Frame:
     order: DepthOrder | None = None
 
 
-def batches(frame: Frame, also: BoolArray | None = None) -> list[tuple[int, int]]:
+def batches(frame: Frame, wanted: BoolArray | None = None) -> list[tuple[int, int]]:
     """The frame's work in ranges of blocks; any may be rasterized anywhere, in any order.
 
     Args:
         frame: the frame.
-        also: (B,) blocks that must be in some range although they have no pairs.
+        wanted: (B,) the blocks that the ranges must hold; by default those that have pairs.
     """
-    return cut_batches(np.diff(frame.pairs.start), frame.blocks, also)
+    counts = np.diff(frame.pairs.start)
+    return cut_batches(counts, frame.blocks, counts > 0 if wanted is None else wanted)
 
 
 def rasterize(

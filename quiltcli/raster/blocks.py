@@ -138,27 +138,22 @@ def _interior_tiles(
     return np.concatenate(found) if found else np.zeros(0, dtype=np.bool_)
 
 
-def cut_batches(
-    pair_counts: IntArray, blocks: Blocks, also: BoolArray | None = None
-) -> list[tuple[int, int]]:
+def cut_batches(pair_counts: IntArray, blocks: Blocks, wanted: BoolArray) -> list[tuple[int, int]]:
     """Group consecutive blocks into batches of bounded work.
 
     Args:
-        pair_counts: (B,) block pairs of each block; blocks without any cost nothing.
+        pair_counts: (B,) block pairs of each block.
         blocks: the blocks.
-        also: (B,) blocks that must be in a batch whether they have pairs or not.
+        wanted: (B,) the blocks that must be in a batch; others cost nothing.
 
     Returns:
         Ranges [first, last) of blocks; what they hold does not depend on the number of workers.
     """
-    needed = pair_counts > 0
-    if also is not None:
-        needed |= also
     area = (blocks.width * blocks.height).tolist()
     counts = pair_counts.tolist()
     batches = []
     first = pixels = pairs = 0
-    for block in np.flatnonzero(needed).tolist():
+    for block in np.flatnonzero(wanted).tolist():
         if pixels and (pixels + area[block] > BATCH_PIXELS or pairs + counts[block] > BATCH_PAIRS):
             batches.append((first, block))
             first, pixels, pairs = block, 0, 0

@@ -8,6 +8,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import OpenEXR
 
 from quiltcli import raster
@@ -98,7 +99,9 @@ def _ours(
     kind: str, stage: Stage, viewer: Viewer, work: Work, buffers: Buffers, ends: ExitStack
 ) -> Contestants:
     """Our own ways: binning, depth keys, hits and whole frames."""
-    frame = partial(draw_frame, stage, viewer, buffers, dirty=work.frame.rays.lit.copy())
+    frame = partial(
+        draw_frame, stage, viewer, buffers, dirty=np.ones(stage.blocks.facet.size, dtype=np.bool_)
+    )
     contestants: dict[str, Callable[[], object]] = {
         f"{kind} bin": lambda: binned(stage, viewer),
         f"{kind} keys": lambda: depth_keys(work),
@@ -143,7 +146,7 @@ def _whole_mesh(place: Place, stage: Stage) -> dict[str, dict[str, list[float]]]
     stage, viewer = with_mesh(stage, place, meshes.detailed(WHOLE_MESH)), viewer_of(place)
     buffers = (shared_buffers if can_fork() else new_buffers)(stage)
     frame = binned(stage, viewer).frame
-    dirty = frame.rays.lit.copy()
+    dirty = np.ones(stage.blocks.facet.size, dtype=np.bool_)
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, [buffers], 2)) if can_fork() else None
         quilt = ends.enter_context(opengl.Quilt(stage, frame, culling=False))

@@ -1,0 +1,42 @@
+"""Binning in shares: however the work is divided, the pairs are the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from ballstage import ball_scene, stage_of_facets
+from rig import cube, viewer
+
+from quiltcli.binframe import bin_frame, bin_share, join, see_vertices, unseen
+from quiltcli.display import lit_facets
+from quiltcli.draw import plan_of
+from quiltcli.homography import quilt_rays
+
+
+@pytest.mark.parametrize("culling", [False, True])
+@pytest.mark.parametrize("depth", ["planar", "radial"])
+def test_shares_together_have_the_pairs_of_the_whole(culling, depth):
+    stage = stage_of_facets(cube(), ball_scene(3))
+    render = stage.job.render.model_copy(update={"backface_culling": culling})
+    stage = replace(stage, job=stage.job.model_copy(update={"render": render}))
+    # Some triangles are cut by near and far, some are left out.
+    eye = viewer((2.2, 1.8, 3.2), near=3.7, far=4.2, depth=depth)
+    rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, eye.eye), eye.eye)
+    plan = plan_of(stage, eye, rays)
+    whole = bin_frame(plan)
+    seen = unseen(stage.scene)
+    for first, last in pairwise([0, 1, 100, 101, len(stage.scene.vertices)]):
+        see_vertices(plan, slice(first, last), seen)
+    ends = [0, 3, 500, 501, len(stage.scene.triangles)]
+    shares = [bin_share(plan, slice(*part), seen) for part in pairwise(ends)]
+    found = join(stage.scene, stage.blocks, seen, shares)
+    assert whole.sight.cut.any()
+    assert whole.triangles < len(stage.scene.triangles)
+    np.testing.assert_array_equal(found.sight.cut, whole.sight.cut)
+    np.testing.assert_array_equal(found.pairs.start, whole.pairs.start)
+    np.testing.assert_array_equal(found.pairs.triangle, whole.pairs.triangle)
+    for count in ("triangles", "reaching", "settled", "facet_pairs"):
+        assert getattr(found, count) == getattr(whole, count) > 0

@@ -1,0 +1,85 @@
+"""Planes over microtiles, and hits that go to their pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from wallscene import hits
+
+from quiltcli.channels import half_floats
+from quiltcli.raster.hits import BASIS, RUN, Hits, exact_values, vector_values
+
+
+def planes(count, seed=4):
+    """Planes (3, count) of very different slopes and heights."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(3, count)) * 10.0 ** rng.integers(-9, 9, (3, count))
+
+
+def test_values_over_a_microtile_are_those_of_the_plane():
+    plane = planes(500)
+    expected = plane.T @ BASIS
+    reach = np.abs(plane.T) @ np.array([7, 7, 1])
+    # Coefficients are rounded to 2⁻⁵⁰ of a number that is at most 8/7 of the reach; the product rounds, too.
+    bound = (7 + 7 + 1) * 2.0**-51 * 8 / 7 + 3 * 2.0**-53
+    assert (np.abs(exact_values(plane) - expected) <= bound * reach[:, None]).all()
+
+
+def test_values_do_not_depend_on_the_order_of_sums_nor_on_the_company():
+    plane = planes(97)
+    whole = exact_values(plane)
+    for part in (slice(0, 1), slice(5, 18), slice(40, 97)):
+        np.testing.assert_array_equal(exact_values(plane[:, part].copy()), whole[part])
+    vectors = np.stack((plane, plane[::-1], plane * 0.3))
+    whole = vector_values(vectors)
+    for part in (slice(0, 1), slice(5, 18), slice(40, 97)):
+        np.testing.assert_array_equal(vector_values(vectors[:, :, part].copy()), whole[:, part])
+    # In float32, every partial sum of the rounded planes is a float32: adding backwards changes nothing.
+    first = whole[:, :, 0]
+    steps = whole[:, :, 1] - first, whole[:, :, 8] - first
+    backwards = (steps[1][:, :, None] * BASIS[1].astype(np.float32)) + (
+        steps[0][:, :, None] * BASIS[0].astype(np.float32) + first[:, :, None]
+    )
+    np.testing.assert_array_equal(backwards, whole)
+
+
+def test_vectors_keep_their_direction():
+    rng = np.random.default_rng(8)
+    vectors = rng.normal(size=(3, 3, 300)) * 10.0 ** rng.integers(-12, 12, 300)
+    vectors[:, :2] *= 0.02
+    exact = np.einsum("cin,ip->cnp", vectors, BASIS)
+    got = vector_values(vectors).astype(np.float64)
+    greatest = np.abs(got).max(axis=(0, 2))
+    assert 0.2 < greatest.min() <= greatest.max() < 8
+    # The scale is a power of two, one for each vector; coefficients are rounded to 2⁻²¹ of it.
+    scale = 2.0 ** np.rint(np.log2(np.abs(exact).max(axis=(0, 2)) / greatest))
+    error = np.abs(got * scale[:, None] - exact)
+    assert (error <= (7 + 7 + 1) * 2.0**-22 * scale[:, None] * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.uint32])
+def test_runs_go_to_eight_neighbours_wherever_they_begin(kind):
+    first = np.array([3, 40, 17, 92 - RUN])
+    values = np.arange(32).reshape(2, 16)
+    one = hits(np.zeros((3, 1)))
+    seen = Hits(**{**vars(one), "first": first, "run": RUN, "depth": np.zeros((2, 16))})
+    buffer = np.full(92, 99, kind)
+    seen.put(buffer, values)
+    expected = np.full(92, 99, kind)
+    expected[seen.pixel] = values
+    np.testing.assert_array_equal(buffer, expected)
+    assert np.count_nonzero(buffer != 99) == 32
+    seen.put(buffer, np.array([[5], [7]]))
+    np.testing.assert_array_equal(buffer[seen.pixel], np.repeat([[5], [7]], 16, axis=1))
+    seen.put(buffer, np.array([[1]]))
+    assert (buffer[seen.pixel] == 1).all()
+
+
+def test_half_floats_are_the_nearest():
+    rng = np.random.default_rng(2)
+    values = np.concatenate((2.0 ** rng.uniform(-24, 15.9, 20000), [0, 1, 65504, 2.0**-24])).astype(
+        np.float32
+    )
+    got, nearest = half_floats(values), values.astype(np.float16)
+    error, least = (np.abs(values.astype(np.float64) - h.astype(np.float64)) for h in (got, nearest))
+    np.testing.assert_array_equal(error, least)
