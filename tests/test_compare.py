@@ -208,7 +208,7 @@ def test_the_command_prints_a_table_and_says_where_the_page_is(
     lines = result.stdout.splitlines()
     names = ["method", "raycast", "zscale 16", "zscale 24", "zscale 32f"]
     assert [line.split("  ")[0] for line in lines[:5]] == names
-    assert lines[5] == "no pixel in wrong order and no seam jump: raycast"
+    assert lines[5].startswith("no pixel in wrong order and no seam jump: raycast")
     assert lines[6:] == [f"written to {tmp_path / 'c' / 'compare.0002'}.{kind}" for kind in ("html", "json")]
     assert "drawing zscale 24" in result.stderr
 
