@@ -183,6 +183,13 @@ def test_a_display_shows_no_more_error_than_its_pixels_cost_and_no_seams(
     assert found.seams_alone == pytest.approx(1, abs=0.01)
 
 
+def test_single_pixels_are_held_against_single_pixels(tmp_path) -> None:
+    job = sky_job(tmp_path, MODELS / "cube5.obj", 600, (0.5, 0.7, 0.9), (0, 0.15, 0))
+    options = PictureOptions(size=(180, 135), samples=2, resampled=True, threads=1, filter="nearest")
+    (result,) = simulate(job, [1], options)
+    assert result.comparison.mean == pytest.approx(result.comparison.resampled, rel=1e-3)
+
+
 def test_seams_do_not_show_where_facets_have_no_bleed_either(tmp_path) -> None:
     mesh = MODELS / "sphere840.obj"
     job = sky_job(tmp_path, mesh, 1200, (0.5, 0.7, 0.9), (0, 0.15, 0), "render.bleed=0")

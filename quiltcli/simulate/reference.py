@@ -35,8 +35,9 @@ def resampled_light(
     through: Camera,
     facet: Int32Array,
     threads: int,
+    how: str = "linear",
 ) -> Float32Array | None:
-    """Direct pictures as dense as the display, resampled once, linearly, to a picture's rays.
+    """Direct pictures as dense as the display, resampled once to a picture's rays.
 
     Args:
         stage: its scene is drawn.
@@ -46,6 +47,7 @@ def resampled_light(
         through: its display of one facet.
         facet: (P,) facet each ray meets, −1 for none.
         threads: batches drawn at a time.
+        how: a filter of `lookup.FILTERS`, that of the display.
 
     Returns:
         (3, P) linear light, black where no lit facet is met; None where none is.
@@ -62,7 +64,7 @@ def resampled_light(
         chosen, row = np.unique(mine[some], return_inverse=True)
         windows, corner = facet_windows(shown.facets, shown.layout, chosen, row, place[:, some], camera.eye)
         images = _drawn(stage, viewer, windows, threads)
-        light[:, met[some]] = look_up(images, row.astype(np.int32), place[:, some] - corner[row].T)
+        light[:, met[some]] = look_up(images, row.astype(np.int32), place[:, some] - corner[row].T, how)
     return light
 
 
