@@ -13,7 +13,7 @@ import numpy as np
 
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import ViewerError
-from quiltcli.geometry import BoolArray, FloatArray, cross, dot, normalized, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, cross, dot, normalized, segments
 from quiltcli.layout import Layout
 from quiltcli.viewer import Viewer
 
@@ -36,33 +36,53 @@ def camera_display(viewer: Viewer, width: int, height: int, fov: float) -> tuple
     right = cross(viewer.look, viewer.up)
     du, dv = right * pixel, -viewer.up * pixel
     origin = viewer.eye + viewer.look - width / 2 * du - height / 2 * dv
-    # Anticlockwise as the eye sees it: it looks at the lit side.
-    raster = np.array([[0, height], [width, height], [width, 0], [0, 0]])
+    size = np.array([[width, height]], dtype=np.int32)
+    return raster_display(origin[None], du[None], dv[None], size, -viewer.look[None])
+
+
+def raster_display(
+    origin: FloatArray, du: FloatArray, dv: FloatArray, size: Int32Array, normal: FloatArray
+) -> tuple[Facets, Layout]:
+    """A display of R whole rasters, and the layout that gives each a page of its own.
+
+    Args:
+        origin: (R, 3) top-left corners, world metres.
+        du: (R, 3) world steps to the next pixel right.
+        dv: (R, 3) world steps to the next pixel down.
+        size: (R, 2) width and height, pixels.
+        normal: (R, 3) unit normals on the lit side.
+    """
+    count = len(size)
+    # Anticlockwise as seen from the lit side, where du points right and dv down unless it is mirrored.
+    raster = np.array([[0, 1], [1, 1], [1, 0], [0, 0]]) * size[:, None]
+    mirrored = dot(cross(du, dv), normal) > 0
+    raster[mirrored] = raster[mirrored, ::-1]
+    corners = origin[:, None] + raster[..., :1] * du[:, None] + raster[..., 1:] * dv[:, None]
     facets = Facets(
-        names=("picture",),
-        corner_start=np.array([0, 4], dtype=np.int64),
-        corners=origin + raster[:, :1] * du + raster[:, 1:] * dv,
-        origin=origin[None],
-        du=du[None],
-        dv=dv[None],
-        size=np.array([[width, height]], dtype=np.int32),
-        normal=-viewer.look[None],
+        names=("picture",) * count,
+        corner_start=4 * np.arange(count + 1, dtype=np.int64),
+        corners=corners.reshape(-1, 3),
+        origin=origin,
+        du=du,
+        dv=dv,
+        size=size,
+        normal=normal,
         both_sides=False,
-        enabled=np.ones(1, dtype=np.bool_),
-        mirrored=np.zeros(1, dtype=np.bool_),
+        enabled=np.ones(count, dtype=np.bool_),
+        mirrored=mirrored,
         uv=None,
         path="camera",
     )
-    return facets, _whole_page(facets)
+    return facets, _own_pages(facets)
 
 
-def _whole_page(facets: Facets) -> Layout:
-    """The layout that gives the one facet a page of its own."""
+def _own_pages(facets: Facets) -> Layout:
+    """The layout that gives each facet's raster a page of its own."""
     return Layout(
-        facet=np.ones(1, dtype=np.int32),
-        page=np.zeros(1, dtype=np.int32),
+        facet=np.arange(1, facets.count + 1, dtype=np.int32),
+        page=np.arange(facets.count, dtype=np.int32),
         size=facets.size,
-        quilt_from_facet=np.eye(2, 3)[None],
+        quilt_from_facet=np.tile(np.eye(2, 3), (facets.count, 1, 1)),
         origin=facets.origin,
         du=facets.du,
         dv=facets.dv,

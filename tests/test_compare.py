@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from tinyjob import write_tiny_job
 
 from quiltcli.cli import main
-from quiltcli.compare import COLUMNS, VARIANTS, CompareOptions, compare, study_json, study_rows
+from quiltcli.compare import COLUMNS, VARIANTS, CompareOptions, compare, study_json, study_rows, study_words
 from quiltcli.compare.charts import Curve, bar_chart, line_chart, ticks
 from quiltcli.compare.eyeviews import _densest
 from quiltcli.compare.findings import REFERENCE, decibels, errors_of, variants_of
@@ -36,7 +36,7 @@ def study(tmp_path_factory: pytest.TempPathFactory):
     )
     (folder / "job.yaml").write_text(
         f"quilt_job: 1\ndisplay: box.yaml\nscene: {ROOT / 'scenes' / 'plates_and_sphere.yaml'}\nframes: 1\n"
-        "viewer: {near: 0.002, far: 50, path: {orbit: {center: [0, 0.15, 0], radius: 1.05, height: 0.5,"
+        "viewer: {near: 0.01, far: 50, path: {orbit: {center: [0, 0.15, 0], radius: 1.05, height: 0.5,"
         " start_deg: -40, end_deg: 60, end_frame: 8}}}\n"
     )
     with pytest.MonkeyPatch.context() as patch:
@@ -69,10 +69,17 @@ def test_exact_depth_puts_no_pixel_in_the_wrong_order_and_no_seam_jumps(found, n
 @pytest.mark.parametrize("bits", ["16", "24"])
 def test_the_others_buffers_order_pixels_wrongly_and_jump_at_seams(found, method: str, bits: str) -> None:
     one = found[f"{method} {bits}"]
-    assert one.wrong + one.lost > 0
-    assert one.behind >= 0
-    assert one.seams.failures > 0.5 * one.seams.counts["points_compared"] > 0
+    assert one.wrong > 0
+    assert one.behind > 0
+    assert one.seams.failures > 0.9 * one.seams.counts["points_compared"] > 0
     assert one.depth.mean > 0.01
+
+
+def test_what_the_figures_come_to_is_said_in_words(study, found) -> None:
+    order, blur = study_words(study)
+    assert order == "no pixel in wrong order and no seam jump: raycast, homography"
+    factor = found["twopass"].seen.mean / found["homography"].seen.mean
+    assert blur == f"seen from the eye, twopass errs {factor:.2f} × as much as homography"
 
 
 def test_fewer_bits_order_more_pixels_wrongly_and_raskars_factor_most(found) -> None:
@@ -201,7 +208,8 @@ def test_the_command_prints_a_table_and_says_where_the_page_is(
     lines = result.stdout.splitlines()
     names = ["method", "raycast", "zscale 16", "zscale 24", "zscale 32f"]
     assert [line.split("  ")[0] for line in lines[:5]] == names
-    assert lines[5:] == [f"written to {tmp_path / 'c' / 'compare.0002'}.{kind}" for kind in ("html", "json")]
+    assert lines[5].startswith("no pixel in wrong order and no seam jump: raycast")
+    assert lines[6:] == [f"written to {tmp_path / 'c' / 'compare.0002'}.{kind}" for kind in ("html", "json")]
     assert "drawing zscale 24" in result.stderr
 
 

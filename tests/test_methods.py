@@ -164,6 +164,22 @@ def test_the_uniform_scale_just_keeps_the_far_plane_on_every_facet() -> None:
     assert order.factor.tolist() == (uniform_scale(row[:, 2], eye, facets, rays) * row[:, 2]).tolist()
 
 
+def test_a_step_of_an_off_axis_buffer_is_worth_less_depth_the_more_its_facet_slants() -> None:
+    """Along a ray D is ρ·Z, so G/D falls 1/ρ times as fast as G/Z: why few bits order fewer pixels wrong."""
+    eye = rig.viewer((2, 1.5, 3), at=(0.1, 0, 0), near=0.5, far=10)
+    facets, rays = standing(rig.cube(), eye)
+    ours, theirs = (depth_order(method, None, eye, facets, rays) for method in ("homography", "offaxis"))
+    point = np.array([0.3, -0.2, 0.4]) - eye.eye
+    for facet in np.flatnonzero(rays.lit):
+        ratio = -dot(facets.normal[facet], point) / dot(eye.look, point)
+        rise = [
+            canonical(order, facet, 1.001 * point) - canonical(order, facet, point)
+            for order in (ours, theirs)
+        ]
+        assert rise[1] / rise[0] == pytest.approx(1 / ratio, rel=1e-9)
+        assert ratio < 1
+
+
 def test_what_a_buffer_holds_is_read_back_as_the_viewers_depth() -> None:
     eye = rig.viewer((0, 0, 3), near=0.5, far=10)
     for bits, off in ((None, 1e-12), ("24", 1e-5), ("16", 1e-3)):

@@ -295,7 +295,14 @@ def shown_of(values: np.ndarray, places, bleed: int = 0) -> Shown:
     facets = flat_display([rectangle(4, 4)] * len(places))
     layout = placed(facets, [moved(*place) for place in places], (width, height))
     buffers = {name: values.reshape(-1).astype(np.float16) for name in "RGB"}
-    return Shown(facets, layout, np.ones(len(places), bool), buffers, pixel_owners(layout, bleed))
+    return Shown(
+        facets,
+        layout,
+        np.ones(len(places), bool),
+        buffers,
+        pixel_owners(layout, bleed),
+        np.array([0, 0, 1.0]),
+    )
 
 
 def test_reduced_pictures_average_facets_alone():

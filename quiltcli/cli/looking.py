@@ -92,7 +92,7 @@ def compare(
 
     Writes a page with figures, charts and close views, and the same as JSON; a table goes to stdout.
     """
-    from quiltcli.compare import COLUMNS, CompareOptions, study_rows, variants_of
+    from quiltcli.compare import COLUMNS, CompareOptions, study_rows, study_words, variants_of
     from quiltcli.compare import compare as compare_methods
     from quiltcli.compare.page import write_comparison
     from quiltcli.job import load_job
@@ -104,6 +104,8 @@ def compare(
     study = compare_methods(loaded, options)
     paths = write_comparison(study, output or loaded.output.directory / "compare")
     print_aligned(COLUMNS, study_rows(study))
+    for words in study_words(study):
+        click.echo(words)
     for path in paths:
         click.echo(f"written to {path}")
 

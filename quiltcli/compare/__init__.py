@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from quiltcli.compare.findings import VARIANTS, Findings, Variant, variants_of
 from quiltcli.compare.study import CompareOptions, Study, compare
-from quiltcli.compare.table import COLUMNS, study_json, study_rows
+from quiltcli.compare.table import COLUMNS, study_json, study_rows, study_words
 
 __all__ = [
     "COLUMNS",
@@ -16,5 +16,6 @@ __all__ = [
     "compare",
     "study_json",
     "study_rows",
+    "study_words",
     "variants_of",
 ]

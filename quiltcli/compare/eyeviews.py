@@ -45,7 +45,7 @@ class EyeView:
 
     def shown(self, stage: Stage, buffers: Buffers) -> Shown:
         """The display with these images on."""
-        return Shown(stage.facets, stage.layout, self.lit, buffers, stage.owners)
+        return Shown(stage.facets, stage.layout, self.lit, buffers, stage.owners, self.camera.eye)
 
     def image(self, light: Float32Array) -> Float32Array:
         """Light (3, P) of all rays as a picture (H, W, 3)."""

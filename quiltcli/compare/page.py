@@ -14,7 +14,7 @@ import numpy as np
 from quiltcli.compare.charts import Curve, bar_chart, line_chart
 from quiltcli.compare.findings import REFERENCE
 from quiltcli.compare.study import Study
-from quiltcli.compare.table import COLUMNS, study_json, study_rows
+from quiltcli.compare.table import COLUMNS, study_json, study_rows, study_words
 from quiltcli.preview import Bytes
 from quiltcli.wholefile import make_folder, write_text
 
@@ -78,6 +78,7 @@ def page_text(study: Study) -> str:
         f"<p>{study.pixels:,} pixels of {study.lit} lit facets;"
         f" near {study.near:g} m, far {study.far:g} m.</p>",
         *_section("Figures", "figures", _table(study)),
+        *(f"<p>{escape(words[0].upper() + words[1:])}.</p>" for words in study_words(study)),
         *_profile(study),
         *_section("Where depth goes wrong", "crops", _crops(study)),
         *_section("Time", "time", bar_chart(*_times(study))),

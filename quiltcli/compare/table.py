@@ -47,6 +47,22 @@ def study_rows(study: Study) -> Iterator[tuple[str, ...]]:
         )
 
 
+def study_words(study: Study) -> Iterator[str]:
+    """What the figures come to, in sentences."""
+    flawless = [
+        found.variant.name
+        for found in study.findings
+        if found.wrong == found.lost == 0 and not found.seams.failures
+    ]
+    yield f"no pixel in wrong order and no seam jump: {', '.join(flawless) or 'none'}"
+    by_name = {found.variant.name: found for found in study.findings}
+    twice = by_name.get("twopass")
+    once = by_name.get("homography", study.findings[0])
+    if twice is not None and once.seen.mean:
+        factor = twice.seen.mean / once.seen.mean
+        yield f"seen from the eye, twopass errs {factor:.2f} × as much as {once.variant.name}"
+
+
 def _count(pixels: int | None) -> str:
     return "–" if pixels is None else f"{pixels:,}"
 

@@ -132,7 +132,7 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
     coarse = None
     if options.resampled:
-        coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads)
+        coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads, options.filter)
     once = None if coarse is None else block_means(_image(coarse, width), options.samples)
     comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples), once)
     return Simulation(viewer.frame, picture, direct, comparison, "")

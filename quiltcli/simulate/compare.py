@@ -20,8 +20,6 @@ _STEPS = (
     (1, 1, 0.9),
 )
 
-_NEAR = 5
-
 
 @dataclass(frozen=True)
 class Comparison:
@@ -34,11 +32,13 @@ class Comparison:
         mean, percentile_99, maximum: of the errors.
         psnr: decibels, all channels, of the light cut at white, 1; infinite where nothing differs.
         flip: mean of the ꟻLIP map (Andersson et al. 2020), as at 67 pixels a degree.
-        seams: error for the picture's contrast within a pixel of where two lit facets meet, over that of
-            the pixels beside: 1 where seams do not show; not a number without seams or contrast.
+        seams: mean error within a pixel of where two lit facets meet, over that of all other pixels:
+            what is shown there counts too; not a number without seams or errors.
         error: (H, W) errors, 0 where nothing is compared.
         resampled: mean error of direct pictures as dense as the display, resampled once; not a number
             where there is none.
+        seams_alone: the same as `seams`, over what it is for those pictures, which show the same with
+            as many pixels and have no seams: 1 where seams do not show.
     """
 
     share: float
@@ -50,6 +50,7 @@ class Comparison:
     seams: float
     error: Float32Array
     resampled: float = math.nan
+    seams_alone: float = math.nan
 
 
 def compare(
@@ -71,9 +72,12 @@ def compare(
     both = [np.where(covered[..., None], image, np.float32(0)) for image in (shown, direct)]
     difference = np.abs(both[0].astype(np.float64) - both[1])
     error = difference.max(axis=-1)
+    at_seams, elsewhere = covered & seam, covered & ~seam
     found = error[covered]
     if not found.size:
         return Comparison(0.0, 0.0, 0.0, 0.0, math.inf, 0.0, math.nan, error.astype(np.float32))
+    seams = _ratio(error, at_seams, elsewhere)
+    once = None if resampled is None else np.abs(resampled.astype(np.float64) - direct).max(axis=-1)
     white = [np.clip(image[covered], 0, 1).astype(np.float64) for image in both]
     square = float(np.mean((white[0] - white[1]) ** 2))
     return Comparison(
@@ -83,46 +87,18 @@ def compare(
         maximum=float(found.max()),
         psnr=-10 * math.log10(square) if square else math.inf,
         flip=float(flip_map(both[1], both[0])[covered].mean()),
-        seams=_seam_ratio(error, direct, covered & seam, covered & _beside(seam)),
+        seams=seams,
         error=error.astype(np.float32),
-        resampled=math.nan if resampled is None else _mean_error(resampled, direct, covered),
+        resampled=math.nan if once is None else float(once[covered].mean()),
+        seams_alone=math.nan if once is None else seams / _ratio(once, at_seams, elsewhere),
     )
 
 
-def _mean_error(image: Float32Array, direct: Float32Array, covered: BoolArray) -> float:
-    return float(np.abs(image[covered].astype(np.float64) - direct[covered]).max(axis=-1).mean())
-
-
-def _beside(seam: BoolArray) -> BoolArray:
-    """Pixels (H, W) near a seam but not at it: the facets are as dense there, seen from as far."""
-    near: NDArray[Any] = seam
-    for _ in range(_NEAR):
-        near = _around(near, np.maximum)
-    result: BoolArray = near & ~seam
-    return result
-
-
-def _seam_ratio(error: NDArray[Any], direct: Float32Array, seam: BoolArray, rest: BoolArray) -> float:
-    """Error for contrast at seams over that beside them.
-
-    Nearly all error is at edges of what is shown, and a seam has its share of these by chance: the
-    contrast around a pixel says how much error it can have.
-    """
-    contrast = np.max(_around(direct, np.maximum) - _around(direct, np.minimum), axis=-1)
-    at_seams, around = (float(contrast[part].sum(dtype=np.float64)) for part in (seam, rest))
-    beside = float(error[rest].sum())
-    if not (at_seams and around and beside):
+def _ratio(error: NDArray[Any], part: BoolArray, rest: BoolArray) -> float:
+    """Mean error of a part of the pixels over that of the rest; not a number where either has none."""
+    if not (error[part].any() and error[rest].any()):
         return math.nan
-    return float(error[seam].sum()) / at_seams * around / beside
-
-
-def _around(image: NDArray[Any], reduce: np.ufunc) -> NDArray[Any]:
-    """Greatest or least of each pixel and its eight neighbours (H, W, …), the border repeated."""
-    padded = np.pad(image, ((1, 1), (1, 1), *((0, 0) for _ in image.shape[2:])), mode="edge")
-    for axis in (0, 1):
-        length = image.shape[axis]
-        padded = reduce.reduce([padded.take(range(k, k + length), axis=axis) for k in (0, 1, 2)])
-    return padded
+    return float(error[part].mean() / error[rest].mean())
 
 
 def flip_map(reference: NDArray[Any], test: NDArray[Any]) -> Float32Array:
@@ -153,6 +129,15 @@ def seam_pixels(facet: Int32Array, samples: int) -> BoolArray:
     return result
 
 
+def _around(image: Int32Array, reduce: np.ufunc) -> Int32Array:
+    """Greatest or least of each pixel and its eight neighbours (H, W), the border repeated."""
+    padded = np.pad(image, 1, mode="edge")
+    for axis in (0, 1):
+        length = image.shape[axis]
+        padded = reduce.reduce([padded.take(range(k, k + length), axis=axis) for k in (0, 1, 2)])
+    return padded
+
+
 def figures(comparison: Comparison) -> list[tuple[str, str]]:
     """The figures as rows of a label and a value."""
     rows = [
@@ -164,16 +149,19 @@ def figures(comparison: Comparison) -> list[tuple[str, str]]:
         ("PSNR", f"{comparison.psnr:.2f} dB"),
         ("FLIP", f"{comparison.flip:.5f}"),
     ]
-    if not math.isnan(comparison.seams):
-        rows.append(("error at seams", f"{comparison.seams:.2f} × that beside them, for the same contrast"))
+    # Without the second figure the first would be taken for what it is not.
+    if not math.isnan(comparison.seams_alone):
+        rows.append(("error at seams", f"{comparison.seams:.2f} × that elsewhere"))
+        rows.append(("", f"{comparison.seams_alone:.2f} × that of the same picture without seams"))
     return rows
 
 
 def _resampling(comparison: Comparison) -> list[tuple[str, str]]:
     if math.isnan(comparison.resampled):
         return []
-    words = f"{comparison.resampled:.3e}, of direct pictures as dense as the display"
-    return [("resampled once, mean", words)]
+    once = comparison.resampled
+    share = f"; the display's is {comparison.mean / once:.3f} × that" if once else ""
+    return [("resampled once, mean", f"{once:.3e}, of direct pictures as dense as the display{share}")]
 
 
 def heat_scale(error: Float32Array) -> float:

@@ -42,7 +42,7 @@ def shown_images(stage: Stage, viewer: Viewer, folder: Path, job_sha: str, threa
     else:
         buffers, source = new_buffers(stage), "drawn for this picture"
         draw_frame(stage, viewer, buffers, threads)
-    return Shown(stage.facets, stage.layout, lit, buffers, owners), source
+    return Shown(stage.facets, stage.layout, lit, buffers, owners, viewer.eye), source
 
 
 def _quilts(stage: Stage, frame: int, folder: Path, job_sha: str) -> Buffers | None:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from quiltcli.display import Facets
+from quiltcli.display import Facets, shared_edges
 from quiltcli.draw import Buffers
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, OwnerArray
-from quiltcli.homography import quilt_rays
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, OwnerArray, segments
+from quiltcli.homography import QuiltRays, quilt_rays
 from quiltcli.layout import Layout
 
 _BLOCK = 1 << 17
@@ -32,6 +33,7 @@ class Shown:
         buffers: R, G and B of the quilt, flat.
         owners: flat: the facet's id inside its polygon, negative where its image goes on past the
             polygon's edge, 0 elsewhere.
+        eye: (3,) the viewer's, for whom the images are; world metres.
     """
 
     facets: Facets
@@ -39,6 +41,25 @@ class Shown:
     lit: BoolArray
     buffers: Buffers
     owners: OwnerArray
+    eye: FloatArray
+
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """Lit facets (F, n) that share an edge with each facet, −1 where there are no more."""
+        shared = shared_edges(self.facets)
+        pairs = np.unique(np.stack((shared.facet_a, shared.facet_b), axis=1), axis=0)
+        pairs = np.concatenate((pairs, pairs[:, ::-1]))[np.tile(self.lit[pairs].all(axis=1), 2)]
+        pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+        count = np.bincount(pairs[:, 0], minlength=self.facets.count)
+        _, rank = segments(np.concatenate(([0], np.cumsum(count))))
+        result = np.full((self.facets.count, int(count.max(initial=0))), -1)
+        result[pairs[:, 0], rank] = pairs[:, 1]
+        return result
+
+    @cached_property
+    def rays(self) -> QuiltRays:
+        """The viewer's rays through the quilt."""
+        return quilt_rays(self.facets, self.layout, self.lit, self.eye)
 
 
 def quilt_places(
@@ -110,18 +131,79 @@ def nearest_pixels(shown: Shown, facet: Int32Array, place: FloatArray) -> IntArr
 
 
 def linear(shown: Shown, facet: Int32Array, place: FloatArray) -> Float32Array:
-    """The light (3, P) between the four pixels around each place, of those that belong to the facet."""
+    """The light (3, P) between the four pixels around each place.
+
+    Past a facet's edge those are its bleed. Where the layout left no room for that, as at the edges of
+    a page, what they would hold is found on the facet beyond the edge; where there is none, those that
+    belong to the facet have to do.
+    """
+    light, total, lost = _between(shown, facet, place)
+    for at, weight, centre in lost:
+        beyond, found = across_edges(shown, facet[at], centre)
+        light[:, at] += np.where(found, weight, 0) * beyond
+        total[at] += np.where(found, weight, 0)
+    return _weighted(shown, facet, place, light, total)
+
+
+def across_edges(shown: Shown, facet: Int32Array, place: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """What a facet's image would hold past its edges: light (3, P), and where (P,) it is known.
+
+    The viewer sees through such a place a point of the facet beyond the edge, where the image of the
+    same ray is; facets that share an edge are looked at.
+
+    Args:
+        shown: the images.
+        facet: (P,) facet index.
+        place: (2, P) pixels of its page, outside its polygon.
+    """
+    light, found = np.zeros((3, facet.size)), np.zeros(facet.size, dtype=np.bool_)
+    matrix = shown.rays.eye_from_quilt[facet]
+    rays = matrix[:, :, 0] * place[0, :, None] + matrix[:, :, 1] * place[1, :, None] + matrix[:, :, 2]
+    for column in shown.neighbours.T:
+        other = column[facet]
+        at = np.flatnonzero(~found & (other >= 0))
+        there = np.einsum("pij,pj->ip", shown.rays.quilt_from_eye[other[at]], rays[at])
+        ahead = there[2] > 0
+        at, there = at[ahead], there[:2, ahead] / there[2, ahead]
+        next_door = other[at].astype(np.int32)
+        _, mine = _address(shown, next_door, *np.floor(there).astype(np.int64))
+        at, there, next_door = at[mine], there[:, mine], next_door[mine]
+        some, total, _ = _between(shown, next_door, there)
+        light[:, at], found[at] = _weighted(shown, next_door, there, some, total), True
+    return light, found
+
+
+def _between(
+    shown: Shown, facet: Int32Array, place: FloatArray
+) -> tuple[FloatArray, FloatArray, list[tuple[IntArray, FloatArray, FloatArray]]]:
+    """Sums over the four pixels around each place, of those that belong to the facet.
+
+    Returns:
+        Weighted light (3, P); sums of the weights (P,); and of those that do not belong to it, index,
+        weight and centre, the first, second, third and fourth of each place.
+    """
     corner = np.floor(place - 0.5)
     share_x, share_y = place - 0.5 - corner
     x, y = corner.astype(np.int64)
     total = np.zeros(facet.size)
     light = np.zeros((3, facet.size))
+    lost = []
     for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
         address, mine = _address(shown, facet, x + dx, y + dy)
-        weight = (share_x if dx else 1 - share_x) * (share_y if dy else 1 - share_y) * mine
+        weight = (share_x if dx else 1 - share_x) * (share_y if dy else 1 - share_y)
+        at = np.flatnonzero(~mine & (weight > 0))
+        lost.append((at, weight[at], corner[:, at] + [[dx + 0.5], [dy + 0.5]]))
+        weight = weight * mine
         total += weight
         for k, name in enumerate("RGB"):
             light[k] += weight * shown.buffers[name][address]
+    return light, total, lost
+
+
+def _weighted(
+    shown: Shown, facet: Int32Array, place: FloatArray, light: FloatArray, total: FloatArray
+) -> Float32Array:
+    """Sums divided by their weights (3, P), of the nearest pixel where there is none."""
     alone = total < 1e-6
     light[:, alone] = nearest(shown, facet[alone], place[:, alone])
     total[alone] = 1

@@ -1,29 +1,30 @@
 """What resampling alone costs: direct pictures as dense as the display, resampled once.
 
 A display of finite pixels can at best show what a plain picture of as many pixels shows, and both have
-to be resampled to be looked at. That picture's error is the measure of the display's. No display is
-equally dense everywhere, so there are several pictures, and each ray takes the one that is as dense as
-the display where it meets it.
+to be resampled to be looked at. That picture's error is the measure of the display's. A display is not
+equally dense everywhere, and a panel that is seen aslant is less dense across than along: a picture of
+square pixels, as many to the solid angle, would be finer in one direction and coarser in the other, and
+err by another amount at every edge. So each facet has a picture of its own, a *window*: the scene drawn
+through the facet's plane with pixels where the facet has its own, as a whole rectangle that goes on
+past the facet's edges. There is no polygon in it, no quilt, no bleed and no seam.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from quiltcli.camera import camera_display
-from quiltcli.display import lit_facets
-from quiltcli.draw import Stage
-from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.camera import raster_display
+from quiltcli.display import Facets, lit_facets
+from quiltcli.draw import Stage, draw_frame, new_buffers
+from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray, dot
 from quiltcli.homography import eye_from_quilt
-from quiltcli.simulate.lookup import Shown, quilt_places
-from quiltcli.simulate.picture import Camera, direct_light, picture_rays
+from quiltcli.layout import Layout
+from quiltcli.simulate.lookup import Shown, look_up, quilt_places
+from quiltcli.simulate.picture import Camera, camera_stage, exact, picture_rays
 from quiltcli.viewer import Viewer
 
-_STEPS = 2  # densities to an octave
-_MOST = 1 << 25
-"""Pixels a direct picture has at most; a display that is denser shows no error of resampling."""
+_MARGIN = 2  # pixels around the places that are looked up: one is needed
+_TOGETHER = 1 << 23  # pixels of windows that are drawn at a time, as far as one window is no larger
 
 
 def resampled_light(
@@ -34,99 +35,87 @@ def resampled_light(
     through: Camera,
     facet: Int32Array,
     threads: int,
+    how: str = "linear",
 ) -> Float32Array | None:
-    """Direct pictures as dense as the display, resampled once, linearly, to a picture's rays.
+    """Direct pictures as dense as the display, resampled once to a picture's rays.
 
     Args:
         stage: its scene is drawn.
         viewer: whose near and far hold.
         shown: the display and its layout.
-        camera: the picture's camera.
+        camera: the picture's camera, at the viewer's eye.
         through: its display of one facet.
         facet: (P,) facet each ray meets, −1 for none.
         threads: batches drawn at a time.
+        how: a filter of `lookup.FILTERS`, that of the display.
 
     Returns:
-        (3, P) linear light, black where no lit facet is met; None where none is, or the display is
-        too dense.
+        (3, P) linear light, black where no lit facet is met; None where none is.
     """
     facing = lit_facets(shown.facets, camera.eye) & shown.lit
     met = np.flatnonzero(facet >= 0)
     met = met[facing[facet[met]]]
     if not met.size:
         return None
-    octave = np.log2(pixel_pitch(shown, camera, through, facet, met))
-    level = np.rint(_STEPS * octave).astype(np.int64)
+    mine = facet[met]
+    place = quilt_places(shown, mine, picture_rays(camera, through, met), camera.eye, facing)
     light = np.zeros((3, facet.size), dtype=np.float32)
-    for each in np.unique(level).tolist():
-        # Not the level's own density but that of the rays it stands for, in the mean.
-        mine = level == each
-        coarse = _coarse_light(stage, viewer, camera, through, float(2 ** octave[mine].mean()), threads)
-        if coarse is None:
-            return None
-        light[:, met[mine]] = coarse[:, met[mine]]
+    for some in _groups(mine, place):
+        chosen, row = np.unique(mine[some], return_inverse=True)
+        windows, corner = facet_windows(shown.facets, shown.layout, chosen, row, place[:, some], camera.eye)
+        images = _drawn(stage, viewer, windows, threads)
+        light[:, met[some]] = look_up(images, row.astype(np.int32), place[:, some] - corner[row].T, how)
     return light
 
 
-def pixel_pitch(
-    shown: Shown, camera: Viewer, through: Camera, facet: Int32Array, met: IntArray
-) -> FloatArray:
-    """Size (M,) of the display's pixels where rays meet it, as a multiple of the rays' distance.
-
-    What a picture gets wrong it gets wrong at edges, in proportion to its pixels' extent across them.
-    A pixel that the display turns and slants is an ellipse to the eye: the mean of its axes is taken,
-    half the sum of the singular values of rays by pixels.
+def facet_windows(
+    facets: Facets, layout: Layout, chosen: Int32Array, row: IntArray, place: FloatArray, eye: FloatArray
+) -> tuple[Camera, IntArray]:
+    """The windows of some facets that hold some places, with a margin.
 
     Args:
-        shown: the display and its layout.
-        camera: the picture's camera.
-        through: its display of one facet.
-        facet: (P,) facet each ray meets.
-        met: (M,) rays that meet lit facets.
+        facets: the display.
+        layout: its layout.
+        chosen: (W,) facet index of each window.
+        row: (P,) window of every place; each has one.
+        place: (2, P) in pixels of the facets' pages.
+        eye: (3,) world metres.
+
+    Returns:
+        The windows as a display with a page each, and (W, 2) the pixel of the facet's page at which
+        each begins.
     """
-    facing = lit_facets(shown.facets, camera.eye) & shown.lit
-    rays = picture_rays(camera, through, met)
-    step = eye_from_quilt(*through, camera.eye)[0, :, :2]
-    here, right, below = (
-        quilt_places(shown, facet[met], rays + move, camera.eye, facing)
-        for move in (np.zeros((3, 1)), 0.5 * step[:, :1], 0.5 * step[:, 1:])
-    )
-    (a, c), (b, d) = 2 * (right - here), 2 * (below - here)
-    # For a 2 × 2 matrix the sum squared is the sum of all squares and twice the determinant.
-    determinant = np.maximum(np.abs(a * d - b * c), 1e-12)
-    result: FloatArray = np.sqrt(a * a + b * b + c * c + d * d + 2 * determinant) / (2 * determinant)
-    return result
+    low, high = _bounds(row, place)
+    corner = np.floor(low).astype(np.int64) - _MARGIN
+    size = (np.ceil(high).astype(np.int64) + _MARGIN - corner).astype(np.int32)
+    du, dv, first = (eye_from_quilt(facets, layout, eye)[chosen, :, k] for k in range(3))
+    origin = eye + first + corner[:, :1] * du + corner[:, 1:] * dv
+    # Facets that are lit on both sides are seen on the one that the eye is on.
+    away = dot(origin - eye, facets.normal[chosen])[:, None]
+    normal = np.where(away > 0, -facets.normal[chosen], facets.normal[chosen])
+    return raster_display(origin, du, dv, size, normal), corner
 
 
-def _coarse_light(
-    stage: Stage, viewer: Viewer, camera: Viewer, through: Camera, pitch: float, threads: int
-) -> Float32Array | None:
-    """A direct picture of pixels of one size, at all rays (3, P); None where it would be too large."""
-    facets, layout = through
-    width, height = layout.pages[0].tolist()
-    wide, high = (max(round(side / pitch), 1) for side in (width, height))
-    if wide * high > _MOST:
-        return None
-    fov = 2 * math.degrees(math.atan(height / 2 * float(np.linalg.norm(facets.dv[0]))))
-    light = direct_light(stage, viewer, camera_display(camera, wide, high, fov), threads)
-    rows = _between(height, high, high / height)
-    columns = _between(width, wide, high / height)
-    return _resampled(light.reshape(3, high, wide), rows, columns).reshape(3, -1)
+def _groups(facet: Int32Array, place: FloatArray) -> list[IntArray]:
+    """Places (P,), by as many facets at a time as can be drawn together."""
+    row = np.unique(facet, return_inverse=True)[1]
+    low, high = _bounds(row, place)
+    group = (np.cumsum((high - low).prod(axis=1)) // _TOGETHER).astype(np.int64)[row]
+    return [np.flatnonzero(group == each) for each in np.unique(group).tolist()]
 
 
-def _between(count: int, pixels: int, scale: float) -> FloatArray:
-    """Places (count,) of rays, in pixels whose centres are whole numbers, between the first and the last."""
-    centre = (np.arange(count) + 0.5 - count / 2) * scale + pixels / 2 - 0.5
-    return np.clip(centre, 0, pixels - 1)
+def _bounds(row: IntArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest (W, 2) of the places (2, P) of each row; none is without."""
+    order = np.argsort(row, kind="stable")
+    start = np.flatnonzero(np.diff(row[order], prepend=-1))
+    low, high = (which.reduceat(place[:, order], start, axis=1).T for which in (np.minimum, np.maximum))
+    return low, high
 
 
-def _resampled(image: Float32Array, rows: FloatArray, columns: FloatArray) -> Float32Array:
-    """An image (C, H, W) between its pixels, at all rows and columns."""
-    for axis, places in ((1, rows), (2, columns)):
-        low = np.minimum(places.astype(np.int64), max(image.shape[axis] - 2, 0))
-        high = np.minimum(low + 1, image.shape[axis] - 1)
-        shape = [1, 1, 1]
-        shape[axis] = -1
-        share = (places - low).astype(np.float32).reshape(shape)
-        image = image.take(low, axis=axis) * (1 - share) + image.take(high, axis=axis) * share
-    return image
+def _drawn(stage: Stage, viewer: Viewer, windows: Camera, threads: int) -> Shown:
+    """The scene through windows."""
+    direct = camera_stage(exact(stage.job), windows, stage.scene)
+    buffers = new_buffers(direct)
+    draw_frame(direct, viewer, buffers, threads)
+    lit = np.ones(windows[0].count, dtype=np.bool_)
+    return Shown(*windows, lit, buffers, direct.owners, viewer.eye)
