@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from flatdisplays import flat_display, random_polygons, rectangle
@@ -171,6 +173,26 @@ def test_better_methods_pack_better():
     assert fills[1] + 0.1 < fills[2]
     assert fills[2] <= fills[3] + 0.02
     assert DEFAULT_METHOD == "auto"
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("size", "aspect"), [(None, None), (None, Fraction(16, 9)), ((200, 150), None)])
+def test_auto_is_never_worse_than_what_it_tries(seed, size, aspect):
+    facets = flat_display([*random_polygons(10, 20, 60, seed), *[rectangle(40 + at, 30) for at in range(12)]])
+    pages = {}
+    for method in ("auto", "rects", "nest"):
+        layout = pack(facets, method, size, aspect=aspect, seconds=0.5)
+        lowest = np.array([box[4] for box in boxes(layout)])[layout.page == layout.page.max()].max()
+        pages[method] = (len(layout.pages), int(layout.pages[0].prod()) if size is None else int(lowest))
+    assert pages["auto"] == min(pages["rects"], pages["nest"])
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_equal_panels_are_turned_by_what_a_row_holds(turned):
+    # 15 of 270 pixels and their padding take 4078 of 4096; turned, 276 pixels wide, 14 do.
+    size = (276, 270) if turned else (270, 276)
+    layout = pack(display(*[size] * 216), "rects", (4096, 4168), padding=2, seconds=0.5)
+    assert len(layout.pages) == 1  # 15 rows of 278 less the last padding
 
 
 @pytest.mark.parametrize("method", WHOLE)

@@ -6,21 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from quiltcli.packing.dice import Dice
 from quiltcli.packing.model import PackInput, PackResult, extents, page_count, used_height
 from quiltcli.packing.mosaic import Cells, cells_of, pack_mosaic
 from quiltcli.packing.shapes import Shapes
-
-
-class Dice:
-    """Numbers that look random and are the same everywhere, for ever (Knuth's MMIX generator)."""
-
-    def __init__(self) -> None:
-        self._state = 1
-
-    def below(self, limit: int) -> int:
-        """A whole number from 0 to limit − 1."""
-        self._state = (self._state * 6364136223846793005 + 1442695040888963407) % (1 << 64)
-        return (self._state >> 33) % limit
 
 
 @dataclass(frozen=True)

@@ -98,10 +98,10 @@ def pack_target(facets: Facets, target: Target) -> Layout:
 
 def _packed(wanted: PackInput, target: Target) -> tuple[PackResult, tuple[int, int]]:
     """Places and page size."""
-    attempts = METHODS[target.method](wanted, target.seconds)
+    searches = METHODS[target.method](wanted, target.seconds)
     if target.size is not None:
-        return best_pages(attempts, wanted, target.seconds), target.size
-    return best_page(attempts, wanted, target.seconds, target.aspect)
+        return best_pages(searches, wanted, target.seconds), target.size
+    return best_page(searches, wanted, target.seconds, target.aspect)
 
 
 def _groups(facets: Facets, rows: IntArray, target: Target) -> Iterator[IntArray]:

@@ -85,5 +85,5 @@ def _fits(wanted: PackInput, target: Target, size: tuple[int, int]) -> bool:
     sides = np.sort(wanted.size, axis=1)
     if (sides > np.sort(size)).any():
         return False
-    attempts = METHODS[target.method](wanted, target.seconds)
-    return page_count(best_pages(attempts, wanted, target.seconds * _SHARE)) <= (target.max_pages or 0)
+    searches = METHODS[target.method](wanted, target.seconds)
+    return page_count(best_pages(searches, wanted, target.seconds * _SHARE)) <= (target.max_pages or 0)

@@ -20,7 +20,6 @@ from quiltcli.job import load_display_file
 from quiltcli.layout import fill
 from quiltcli.packing import METHODS, PackInput, pack
 from quiltcli.packing.model import used_height
-from quiltcli.packing.search import best_pages
 from quiltcli.packing.shortage import scaled
 
 MODELS = Path(__file__).parents[2] / "display_models"
@@ -85,7 +84,8 @@ def strip(names: Iterable[str], seconds: float = 10) -> list[list[str]]:
     for name in names:
         wanted = sixteen_megapixels(loaded(name))
         start = time.process_time()
-        results = [best_pages([attempt], wanted, seconds) for attempt in METHODS["auto"](wanted, seconds)]
+        attempts = [attempt for part in METHODS["auto"](wanted, seconds) for attempt in part]
+        results = [attempt.run(wanted) for attempt in attempts]
         spent = time.process_time() - start
         share = area(wanted) / (4096 * min(used_height(wanted, result) for result in results))
         aim = STRIP[name]
