@@ -11,12 +11,12 @@ from packcheck import claimed, collisions
 
 from quiltcli.errors import LayoutError
 from quiltcli.layout import check_layout, fill, layout_text, whole_pixel
-from quiltcli.packing import DEFAULT_METHOD, METHODS, PackResult, pack
+from quiltcli.packing import DEFAULT_METHOD, STEADY, PackResult, pack
 from quiltcli.packing.pack import quilt_from_facet
 
-every_method = pytest.mark.parametrize("method", METHODS)
+every_method = pytest.mark.parametrize("method", STEADY)
 BOXES = ("rows", "rects", "maxrects")
-WHOLE = tuple(method for method in METHODS if method != "net")
+WHOLE = tuple(method for method in STEADY if method != "net")
 QUICK = 0.1  # seconds of effort
 
 
@@ -242,7 +242,7 @@ def test_too_many_pages():
 def test_bad_arguments_are_told_together():
     facets = display((4, 3), enabled=[False])
     assert said(facets, "maxrect", (0, 16), padding=-1, max_pages=0) == [
-        "unknown packing method 'maxrect' (known: auto, rows, rects, maxrects, nest, net;"
+        "unknown packing method 'maxrect' (known: auto, rows, rects, maxrects, nest, net, sparrow;"
         " did you mean maxrects?)",
         "page size 0×16; both must be at least 1 pixel",
         "padding -1; it must be 0 pixels or more",

@@ -11,11 +11,11 @@ from packcheck import MODELS, collisions, model
 
 from quiltcli.display import corner_pixels
 from quiltcli.layout import Layout, check_layout, fill, layout_text, pixel_owners, quilt_polygons, whole_pixel
-from quiltcli.packing import METHODS, pack
+from quiltcli.packing import STEADY, pack
 from quiltcli.unmap import facet_image, quilt_buffers
 
 NAMES = sorted(path.stem for path in MODELS.glob("*.yaml"))
-WHOLE = [method for method in METHODS if method != "net"]
+WHOLE = [method for method in STEADY if method != "net"]
 
 
 def unchanged(layout: Layout) -> bool:
@@ -38,7 +38,7 @@ def test_no_facets_of_a_display_meet(name, method):
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_no_facets_of_any_display_meet(name, method):
     facets = model(name)
     layout = pack(facets, method)
@@ -50,7 +50,7 @@ def test_no_facets_of_any_display_meet(name, method):
     assert collisions(layout, 0 if method == "net" else 5) == 0
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_noise_survives_the_way_out_and_back(method):
     facets = flat_display(random_polygons(40, 6, 40, seed=9))
     layout = pack(facets, method, (70, 60), seconds=0.1, mirror=method != "net")
@@ -70,7 +70,7 @@ def test_rasters_stay_the_displays(method):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_the_same_display_gives_the_same_file(method):
     one, other = (layout_text(pack(model("teapot1024"), method)) for _ in range(2))
     assert one == other

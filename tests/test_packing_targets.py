@@ -15,12 +15,12 @@ from quiltcli.cli import main
 from quiltcli.display import Facets
 from quiltcli.errors import LayoutError
 from quiltcli.layout import check_layout, read_layout, write_layout
-from quiltcli.packing import METHODS, pack, read_aspect
+from quiltcli.packing import STEADY, pack, read_aspect
 from quiltcli.packing.pack import pack_target
 from quiltcli.packing.target import Target
 
 SHARDS = flat_display(random_polygons(30, 10, 60, seed=21))
-WHOLE = [method for method in METHODS if method != "net"]
+WHOLE = [method for method in STEADY if method != "net"]
 
 
 def display(*sizes: tuple[int, int], **more: object) -> Facets:
@@ -45,7 +45,7 @@ def test_other_aspects_are_refused(text):
         read_aspect(text)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 @pytest.mark.parametrize("aspect", [Fraction(16, 9), Fraction(1, 2)])
 def test_a_page_has_the_aspect_asked_for(method, aspect):
     layout = pack(SHARDS, method, aspect=aspect, seconds=0.2)
@@ -61,7 +61,7 @@ def test_the_page_of_an_aspect_is_the_smallest_that_rows_take():
     assert layout.pages.tolist() == [[96, 96]]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_limits_of_a_page(method):
     facets = display(*[(10, 8)] * 7)
     layout = pack(facets, method, (64, 64), page_facets=3, seconds=0.1)
@@ -97,7 +97,7 @@ def test_wishes_at_odds():
     ]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_what_is_missing_and_what_would_do(method):
     facets = display(*[(10, 10)] * 5)
     lines = said(facets, method, (20, 20), padding=0, max_pages=1, seconds=0.1)
@@ -110,7 +110,7 @@ def test_what_is_missing_and_what_would_do(method):
     ]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_the_density_and_the_size_that_are_named_do(method):
     (line,) = said(SHARDS, method, (150, 150), max_pages=1, seconds=0.5)
     share = float(line.split("at most ")[2].split(" %")[0]) / 100
@@ -126,7 +126,7 @@ def only(facets: Facets, rows: list[int]) -> Facets:
     return replace(facets, enabled=enabled)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 @pytest.mark.parametrize("first", ["nest", "net"])
 def test_pinned_facets_stay_and_nothing_meets_them(method, first, tmp_path):
     write_layout(pack(only(SHARDS, [3, 4, 5, 9, 20]), first, (100, 90), seconds=0.1), tmp_path / "pins.yaml")

@@ -25,7 +25,7 @@ from quiltcli.job.base import (
 )
 
 # Names of the packing stage, which comes later; known here so that a wrong one is shown in its line.
-PACKING_METHODS = ("auto", "rows", "rects", "maxrects", "nest", "net")
+PACKING_METHODS = ("auto", "rows", "rects", "maxrects", "nest", "net", "sparrow")
 
 
 class PackSpec(Model):

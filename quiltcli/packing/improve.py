@@ -9,6 +9,7 @@ import numpy as np
 from quiltcli.packing.dice import Dice
 from quiltcli.packing.model import PackInput, PackResult, extents, page_count, used_height
 from quiltcli.packing.mosaic import Cells, cells_of, pack_mosaic
+from quiltcli.packing.settle import settle
 from quiltcli.packing.shapes import Shapes
 
 
@@ -30,7 +31,7 @@ class Mosaic:
     _cells: list[list[Cells]] = field(default_factory=list)
 
     def run(self, wanted: PackInput) -> PackResult:
-        """The best of all mosaics that were tried."""
+        """The best of all mosaics that were tried, settled."""
         if not self._cells:
             self._cells.extend(cells_of(wanted, self.shapes, self.cell))
         order = np.lexsort((np.arange(self.shapes.area.size), -self.shapes.area)).tolist()
@@ -44,7 +45,8 @@ class Mosaic:
             cost = _cost(wanted, result)
             if cost <= least:
                 best, least, order, locks = result, cost, new_order, new_locks
-        return best
+        # Many facets fill holes between larger ones anyway, and take long to settle.
+        return best if self.band else settle(wanted, self.shapes, best)
 
     def _changed(self, order: list[int], locks: list[int], dice: Dice) -> tuple[list[int], list[int]]:
         """One or two changes: two shapes trade places in the order, or one is bound to an orientation."""

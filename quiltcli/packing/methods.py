@@ -9,6 +9,7 @@ from quiltcli.packing.model import PackInput
 from quiltcli.packing.nest import nest_attempts
 from quiltcli.packing.net import net_attempts
 from quiltcli.packing.rects import maxrects_attempts, rects_attempts, rows_attempts
+from quiltcli.packing.sparrow import sparrow_attempts
 
 _SPARSE = 0.7  # of its rectangles a display must fill for rectangles to have a chance
 
@@ -31,5 +32,9 @@ METHODS: Mapping[str, Method] = {
     "maxrects": _alone(maxrects_attempts),
     "nest": _alone(nest_attempts),
     "net": _alone(net_attempts),
+    "sparrow": lambda wanted, seconds: [*_auto(wanted, seconds), sparrow_attempts(wanted, seconds)],
 }
+STEADY = tuple(name for name in METHODS if name != "sparrow")
+"""Methods that give the same layout every time: they read no clock."""
+
 DEFAULT_METHOD = "auto"

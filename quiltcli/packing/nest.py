@@ -8,6 +8,7 @@ from functools import partial
 from quiltcli.packing.attempt import SLOW, Attempt, least_width
 from quiltcli.packing.improve import Mosaic
 from quiltcli.packing.model import PackInput, PackResult
+from quiltcli.packing.settle import settle
 from quiltcli.packing.shapes import Shapes, facet_shapes
 from quiltcli.packing.shelves import ShelfRule, pack_shelves
 
@@ -55,7 +56,8 @@ def shape_attempts(wanted: PackInput, shapes: Shapes, seconds: float) -> list[At
 
 
 def _shelves(wanted: PackInput, shapes: Shapes, rule: ShelfRule) -> PackResult:
-    return pack_shelves(wanted, shapes, rule)
+    result = pack_shelves(wanted, shapes, rule)
+    return settle(wanted, shapes, result) if len(result.page) <= FEW else result
 
 
 def _shelf_seconds(shapes: Shapes, rule: ShelfRule) -> float:

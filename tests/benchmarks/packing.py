@@ -18,7 +18,7 @@ from quiltcli.display import Facets, corner_pixels, load_display
 from quiltcli.geometry import next_in_row
 from quiltcli.job import load_display_file
 from quiltcli.layout import fill
-from quiltcli.packing import METHODS, PackInput, pack
+from quiltcli.packing import METHODS, STEADY, PackInput, pack
 from quiltcli.packing.model import used_height
 from quiltcli.packing.shortage import scaled
 
@@ -50,11 +50,11 @@ def loaded(name: str) -> Facets:
 
 def own_density(names: Iterable[str]) -> list[list[str]]:
     """A row for every display: fill and seconds of every method on the smallest page it finds."""
-    rows = [["display", "facets", "megapixels", *METHODS, "page of auto"]]
+    rows = [["display", "facets", "megapixels", *STEADY, "page of auto"]]
     for name in names:
         facets = loaded(name)
         cells, page = [], ""
-        for method in METHODS:
+        for method in STEADY:
             start = time.process_time()
             layout = pack(facets, method)
             seconds = time.process_time() - start
