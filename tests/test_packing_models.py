@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from flatdisplays import flat_display, random_polygons, rectangle
-from packcheck import MODELS, collisions, model
+from packcheck import MODELS, collisions, model, wanted_of
 
 from quiltcli.display import corner_pixels
 from quiltcli.layout import Layout, check_layout, fill, layout_text, pixel_owners, quilt_polygons, whole_pixel
 from quiltcli.packing import STEADY, pack
+from quiltcli.packing.model import used_height
+from quiltcli.packing.nest import nest_attempts
 from quiltcli.unmap import facet_image, quilt_buffers
 
 NAMES = sorted(path.stem for path in MODELS.glob("*.yaml"))
@@ -114,7 +117,35 @@ def test_five_thousand_polygons():
     assert time.process_time() - start < 60
     check_layout(layout)
     assert collisions(layout, 2) == 0
-    assert fill(layout) > 0.62
+    assert fill(layout) > 0.745
+
+
+@pytest.mark.parametrize(
+    ("padding", "align", "mirror", "size"),
+    [(2, 1, False, None), (0, 1, True, (300, 200)), (3, 4, False, (280, 260))],
+)
+def test_a_pile_of_unlike_facets_is_valid_and_denser_than_rows(padding, align, mirror, size):
+    facets = flat_display(random_polygons(140, 12, 60, seed=padding))
+    wanted = wanted_of(facets, (512, 4096), padding, align, mirror=mirror)
+    pile, *shelves = nest_attempts(wanted, 10)[:4]
+    assert pile.family == "pile"
+    lowest = min(used_height(wanted, shelf.run(wanted)) for shelf in shelves)
+    assert used_height(wanted, pile.run(wanted)) < 0.95 * lowest
+    layout = pack(facets, "nest", size, padding, align=align, mirror=mirror, seconds=0.1)
+    check_layout(layout)
+    assert collisions(layout, padding) == 0
+    assert unchanged(layout)
+
+
+def test_a_pile_goes_around_pins():
+    polygons = random_polygons(140, 12, 60, seed=8)
+    facets = flat_display(polygons)
+    first = replace(facets, enabled=np.arange(140) % 7 == 0)
+    pins = pack(first, "rows", (300, 240))
+    layout = pack(facets, "nest", pins=pins, seconds=0.1)
+    assert collisions(layout, 2) == 0
+    assert len(layout.pages) > 1
+    assert (layout.page[np.arange(140) % 7 > 0] == 0).any()
 
 
 def test_concave_facets_interlock():

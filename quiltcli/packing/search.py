@@ -82,7 +82,9 @@ def _best_page(
     for number in scouts.values():
         attempt = attempts[number]
         share = _SCOUTING * seconds / len(scouts) / max(attempt.seconds, 1e-9)
-        tries.scout(number, attempt, int(min(max(share, 3), _WIDTHS)))
+        # Thousands of facets fill one width as well as another.
+        fewest = 3 if 3 * attempt.seconds <= seconds else 1
+        tries.scout(number, attempt, int(min(max(share, fewest), _WIDTHS)))
     for number, attempt in enumerate(attempts):
         if number not in scouts.values():
             tries.follow(number, attempt, scouts[attempt.family], seconds)
@@ -121,10 +123,10 @@ class _Tries:
     def scout(self, number: int, attempt: Attempt, count: int) -> None:
         """Make an attempt on this many widths: spread out, or closing in on the least of the aspect."""
         if self.aspect is None:
-            sides = math.sqrt(attempt.area) * (0.8 + 0.6 * spread(count))
-            whole = {
-                _rounded(max(int(side), attempt.narrowest)) for side in (*sides, self.wanted.size[:, 0].max())
-            }
+            sides = (math.sqrt(attempt.area) * (0.8 + 0.6 * spread(count))).tolist()
+            if count > 1:  # a column of facets may be best
+                sides.append(int(self.wanted.size[:, 0].max()))
+            whole = {_rounded(max(int(side), attempt.narrowest)) for side in sides}
             for width in sorted(width for width in whole if width <= LARGEST_PAGE) or [LARGEST_PAGE]:
                 self._at(number, attempt, width)
             return
@@ -182,9 +184,8 @@ class _Tries:
 
 
 def spread(count: int) -> FloatArray:
-    """Numbers from 0 to 1, evenly spread, that include those of every lesser count (van der Corput)."""
-    halves = [int(f"{number:b}"[::-1], 2) / (1 << number.bit_length()) for number in range(1, count)]
-    return np.array([0.0, 1.0, *halves][:count])
+    """Numbers between 0 and 1, evenly spread, that include those of every lesser count (van der Corput)."""
+    return np.array([int(f"{n:b}"[::-1], 2) / (1 << n.bit_length()) for n in range(1, count + 1)])
 
 
 def _rounded(pixels: int) -> int:
