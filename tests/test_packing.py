@@ -12,7 +12,7 @@ from packcheck import claimed, collisions
 from quiltcli.errors import LayoutError
 from quiltcli.layout import check_layout, fill, layout_text, whole_pixel
 from quiltcli.packing import DEFAULT_METHOD, STEADY, PackResult, pack
-from quiltcli.packing.pack import quilt_from_facet
+from quiltcli.packing.model import quilt_from_facet
 
 every_method = pytest.mark.parametrize("method", STEADY)
 BOXES = ("rows", "rects", "maxrects")

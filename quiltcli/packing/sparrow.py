@@ -25,11 +25,13 @@ from quiltcli.packing.attempt import Attempt
 from quiltcli.packing.grown import grown_by_square
 from quiltcli.packing.model import PackInput, PackResult
 from quiltcli.packing.nest import nest_attempts
+from quiltcli.packing.search import LARGEST_PAGE
 from quiltcli.packing.settle import settle
 from quiltcli.packing.shapes import Shapes, facet_shapes
 
-_SCOUT, _MAIN = 0.1, 0.58
-"""Of the time, for a look at one page width, and for the search on the best of them."""
+_SHARES, _SHARES_OF_ONE = (0.1, 0.58), (0.05, 0.95)
+"""Of the time, for a look at one of several page widths and for the search on the best of them; and when
+the page is given, for a look whether it is enough and for the search on it."""
 
 
 def sparrow_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
@@ -45,9 +47,10 @@ def sparrow_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     first = nest_attempts(wanted, seconds)[0]
     narrowest = first.narrowest + 2 * wanted.align
     area = float(shapes.area.sum())
+    shares = _SHARES if max(wanted.page) == LARGEST_PAGE else _SHARES_OF_ONE
     return [
         Attempt(_Search(shapes, first, share * seconds).run, share * seconds, area, "sparrow", narrowest)
-        for share in (_SCOUT, _MAIN)
+        for share in shares
     ]
 
 
