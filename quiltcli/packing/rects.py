@@ -13,12 +13,23 @@ from quiltcli.geometry import IntArray
 from quiltcli.packing.attempt import SLOW, Attempt, least_width
 from quiltcli.packing.dice import Dice
 from quiltcli.packing.maxrects import pack_maxrects, place_maxrects, size_orders
-from quiltcli.packing.model import PackInput, PackResult, extents, grown_size, page_count, used_height
+from quiltcli.packing.model import (
+    PackInput,
+    PackResult,
+    extents,
+    grown_size,
+    page_count,
+    placed_size,
+    used_height,
+)
 from quiltcli.packing.rows import pack_rows
 from quiltcli.packing.skyline import pack_skyline
 
 _IMPROVED = 400
 """Rectangles up to which trying other orders pays."""
+
+_SPLITS = 20
+"""Most places at which an order is split into rectangles that stand and such that lie."""
 
 _IMPROVING = 0.3  # of the time, for improving an order on one page width
 
@@ -50,12 +61,10 @@ def rects_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     count, area, narrowest = len(wanted.size), _area(wanted), least_width(wanted)
     orders = size_orders(wanted)
     once = _skyline_seconds(count)
-    wide = wanted.size[:, 0] >= wanted.size[:, 1]
-    stances = [np.where(wide, 1, 0), np.where(wide, 0, 1)]
     quick = [Attempt(partial(pack_skyline, order=order), once, area, "boxes", narrowest) for order in orders]
     alike = [
         Attempt(partial(pack_skyline, order=orders[0], lock=lock), once, area, stance, narrowest)
-        for stance, lock in zip(("standing", "lying"), stances, strict=True)
+        for stance, lock in zip(("standing", "lying"), _stances(wanted), strict=True)
     ]
     thorough = [
         Attempt(partial(place_maxrects, order=order), _maxrects_seconds(count), area, "boxes", narrowest)
@@ -64,7 +73,8 @@ def rects_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     better = []
     if count <= _IMPROVED:
         steps = int(_IMPROVING * seconds / once)
-        better = [Attempt(Reordered(steps).run, (steps + 1) * once, area, "boxes", narrowest)]
+        starts = 9 + 2 * _SPLITS
+        better = [Attempt(Reordered(steps).run, (steps + starts) * once, area, "boxes", narrowest)]
     return [*quick[:1], *alike, *thorough, *quick[1:], *better]
 
 
@@ -96,12 +106,33 @@ class Reordered:
 
 
 def _starts(wanted: PackInput) -> Iterator[tuple[IntArray, IntArray, PackResult]]:
-    """Orders and turns to begin from."""
-    wide = wanted.size[:, 0] >= wanted.size[:, 1]
-    free = np.full(len(wide), -1)
+    """Orders and turns to begin from: all free, all standing, all lying, and the first of them otherwise.
+
+    Of equal panels, rows that stand and rows that lie are of unlike height and hold unlike numbers, and a
+    page is often filled best by some of each.
+    """
+    standing, lying = _stances(wanted)
     for order in size_orders(wanted):
-        for lock in (free, np.where(wide, 1, 0), np.where(wide, 0, 1)):
+        for lock in (np.full(len(order), -1), standing, lying):
             yield order, lock, pack_skyline(wanted, order, lock)
+    order = size_orders(wanted)[0]
+    for one, other in ((standing, lying), (lying, standing)):
+        across = int(_placed(wanted, one)[:, 0].mean()) + wanted.padding
+        row = max((wanted.page[0] + wanted.padding) // across, -(-len(order) // _SPLITS))
+        for first in range(row, len(order), row):
+            lock = other.copy()
+            lock[order[:first]] = one[order[:first]]
+            yield order, lock, pack_skyline(wanted, order, lock)
+
+
+def _stances(wanted: PackInput) -> tuple[IntArray, IntArray]:
+    """Quarter turns by which all rectangles stand, and by which all lie."""
+    wide = wanted.size[:, 0] >= wanted.size[:, 1]
+    return np.where(wide, 1, 0), np.where(wide, 0, 1)
+
+
+def _placed(wanted: PackInput, lock: IntArray) -> IntArray:
+    return placed_size(wanted.size, lock.astype(np.int32)).astype(np.int64)
 
 
 def _changed(order: IntArray, lock: IntArray, dice: Dice) -> tuple[IntArray, IntArray]:
