@@ -85,10 +85,8 @@ def _identify(piece: Piece, image: Float32Array) -> None:
     _write(image, str(piece.facet), centre + (0, 0.05 * half), (1.6 * half, 0.75 * half), WHITE)
     _flag(image, centre - (0, 0.68 * half), 0.6 * half)
     for at, corner in enumerate(piece.polygon):
-        inward = centre - corner
-        reach = float(np.hypot(*inward))
-        size = min(0.3 * radius, 0.25 * reach)
-        _write(image, corner_letter(at), corner + inward * min(1, 1.25 * size / reach), (size, size), GREEN)
+        size = letter_size(corner, centre, radius)
+        _write(image, corner_letter(at), beside_corner(piece.polygon, at, size), (size, size), GREEN)
 
 
 def _mark(piece: Piece, image: Float32Array) -> None:
@@ -154,6 +152,30 @@ def corner_letter(at: int) -> str:
     """A to Z, then AA, AB …: the name of a polygon's corner, in the order of the mesh face."""
     letter = chr(ord("A") + at % 26)
     return letter if at < 26 else corner_letter(at // 26 - 1) + letter
+
+
+def letter_size(corner: FloatArray, centre: FloatArray, radius: float) -> float:
+    """Height of a corner's letter on a facet whose roomiest circle is this, pixels."""
+    return min(0.3 * radius, 0.25 * float(np.hypot(*(centre - corner))))
+
+
+def beside_corner(polygon: FloatArray, at: int, size: float) -> FloatArray:
+    """Centre (2,) of a letter of this size in a corner of a polygon: on the bisector, clear of both sides.
+
+    In a corner too sharp for that it stays within three letters of the tip.
+    """
+    corner = polygon[at]
+    sides = np.stack((polygon[at - 1] - corner, polygon[(at + 1) % len(polygon)] - corner))
+    sides = sides / np.maximum(np.hypot(sides[:, 0], sides[:, 1]), 1e-12)[:, None]
+    x, y = polygon.T
+    way = math.copysign(1, float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()))
+    # From the side behind to the side ahead, through the inside.
+    angle = math.atan2(sides[1, 0] * sides[0, 1] - sides[1, 1] * sides[0, 0], float(sides[0] @ sides[1]))
+    half = (angle * way) % (2 * math.pi) / 2
+    cos, sin = math.cos(half * way), math.sin(half * way)
+    inward = np.array((cos * sides[1, 0] - sin * sides[1, 1], sin * sides[1, 0] + cos * sides[1, 1]))
+    result: FloatArray = corner + inward * min(0.9 * size / max(math.sin(half), 1e-9), 3 * size)
+    return result
 
 
 def _write(

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from quiltcli.display import Facets, load_display
+from quiltcli.display import Facets, corner_pixels, load_display
 from quiltcli.job import load_display_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.spans import facet_spans
+from quiltcli.packing import PackInput
 
 MODELS = Path(__file__).parents[1] / "display_models"
 
@@ -38,3 +40,9 @@ def claimed(layout: Layout) -> int:
     """Pixels inside facets, counted facet by facet: one that two claim counts twice."""
     spans = facet_spans(layout)
     return int((spans.stop - spans.start).sum())
+
+
+def wanted_of(facets: Facets, page: tuple[int, int], padding: int, align: int = 1, **more: Any) -> PackInput:
+    """What a packing method is given for all facets of a display."""
+    polygon = corner_pixels(facets)
+    return PackInput(facets.size, facets.corner_start, polygon, page, padding, align, **more)

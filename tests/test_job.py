@@ -269,9 +269,9 @@ def test_schemas_in_the_docs_are_up_to_date() -> None:
 
 
 def test_names_shared_with_later_stages() -> None:
-    from quiltcli.packing import METHODS
+    from quiltcli.packing import STEADY
 
-    assert set(PACKING_METHODS) == set(METHODS)
+    assert set(PACKING_METHODS) == set(STEADY)
     assert "zip" in COMPRESSIONS
 
 

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from flatdisplays import flat_display, random_polygons, rectangle
-from packcheck import MODELS, collisions, model
+from packcheck import MODELS, collisions, model, wanted_of
 
 from quiltcli.display import corner_pixels
 from quiltcli.layout import Layout, check_layout, fill, layout_text, pixel_owners, quilt_polygons, whole_pixel
-from quiltcli.packing import METHODS, pack
+from quiltcli.packing import STEADY, pack
+from quiltcli.packing.model import used_height
+from quiltcli.packing.nest import nest_attempts
 from quiltcli.unmap import facet_image, quilt_buffers
 
 NAMES = sorted(path.stem for path in MODELS.glob("*.yaml"))
-WHOLE = [method for method in METHODS if method != "net"]
+WHOLE = [method for method in STEADY if method != "net"]
 
 
 def unchanged(layout: Layout) -> bool:
@@ -38,7 +41,7 @@ def test_no_facets_of_a_display_meet(name, method):
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_no_facets_of_any_display_meet(name, method):
     facets = model(name)
     layout = pack(facets, method)
@@ -50,7 +53,7 @@ def test_no_facets_of_any_display_meet(name, method):
     assert collisions(layout, 0 if method == "net" else 5) == 0
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_noise_survives_the_way_out_and_back(method):
     facets = flat_display(random_polygons(40, 6, 40, seed=9))
     layout = pack(facets, method, (70, 60), seconds=0.1, mirror=method != "net")
@@ -70,7 +73,7 @@ def test_rasters_stay_the_displays(method):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_the_same_display_gives_the_same_file(method):
     one, other = (layout_text(pack(model("teapot1024"), method)) for _ in range(2))
     assert one == other
@@ -114,7 +117,35 @@ def test_five_thousand_polygons():
     assert time.process_time() - start < 60
     check_layout(layout)
     assert collisions(layout, 2) == 0
-    assert fill(layout) > 0.62
+    assert fill(layout) > 0.745
+
+
+@pytest.mark.parametrize(
+    ("padding", "align", "mirror", "size"),
+    [(2, 1, False, None), (0, 1, True, (300, 200)), (3, 4, False, (280, 260))],
+)
+def test_a_pile_of_unlike_facets_is_valid_and_denser_than_rows(padding, align, mirror, size):
+    facets = flat_display(random_polygons(140, 12, 60, seed=padding))
+    wanted = wanted_of(facets, (512, 4096), padding, align, mirror=mirror)
+    pile, *shelves = nest_attempts(wanted, 10)[:4]
+    assert pile.family == "pile"
+    lowest = min(used_height(wanted, shelf.run(wanted)) for shelf in shelves)
+    assert used_height(wanted, pile.run(wanted)) < 0.95 * lowest
+    layout = pack(facets, "nest", size, padding, align=align, mirror=mirror, seconds=0.1)
+    check_layout(layout)
+    assert collisions(layout, padding) == 0
+    assert unchanged(layout)
+
+
+def test_a_pile_goes_around_pins():
+    polygons = random_polygons(140, 12, 60, seed=8)
+    facets = flat_display(polygons)
+    first = replace(facets, enabled=np.arange(140) % 7 == 0)
+    pins = pack(first, "rows", (300, 240))
+    layout = pack(facets, "nest", pins=pins, seconds=0.1)
+    assert collisions(layout, 2) == 0
+    assert len(layout.pages) > 1
+    assert (layout.page[np.arange(140) % 7 > 0] == 0).any()
 
 
 def test_concave_facets_interlock():

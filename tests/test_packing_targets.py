@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,15 +13,16 @@ from flatdisplays import PITCH, flat_display, random_polygons, rectangle
 from packcheck import MODELS, collisions
 
 from quiltcli.cli import main
-from quiltcli.display import Facets
+from quiltcli.display import Facets, load_display
 from quiltcli.errors import LayoutError
+from quiltcli.job import load_display_file
 from quiltcli.layout import check_layout, read_layout, write_layout
-from quiltcli.packing import METHODS, pack, read_aspect
+from quiltcli.packing import STEADY, pack, read_aspect
 from quiltcli.packing.pack import pack_target
 from quiltcli.packing.target import Target
 
 SHARDS = flat_display(random_polygons(30, 10, 60, seed=21))
-WHOLE = [method for method in METHODS if method != "net"]
+WHOLE = [method for method in STEADY if method != "net"]
 
 
 def display(*sizes: tuple[int, int], **more: object) -> Facets:
@@ -45,7 +47,7 @@ def test_other_aspects_are_refused(text):
         read_aspect(text)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 @pytest.mark.parametrize("aspect", [Fraction(16, 9), Fraction(1, 2)])
 def test_a_page_has_the_aspect_asked_for(method, aspect):
     layout = pack(SHARDS, method, aspect=aspect, seconds=0.2)
@@ -61,7 +63,7 @@ def test_the_page_of_an_aspect_is_the_smallest_that_rows_take():
     assert layout.pages.tolist() == [[96, 96]]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_limits_of_a_page(method):
     facets = display(*[(10, 8)] * 7)
     layout = pack(facets, method, (64, 64), page_facets=3, seconds=0.1)
@@ -97,7 +99,7 @@ def test_wishes_at_odds():
     ]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_what_is_missing_and_what_would_do(method):
     facets = display(*[(10, 10)] * 5)
     lines = said(facets, method, (20, 20), padding=0, max_pages=1, seconds=0.1)
@@ -110,7 +112,7 @@ def test_what_is_missing_and_what_would_do(method):
     ]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 def test_the_density_and_the_size_that_are_named_do(method):
     (line,) = said(SHARDS, method, (150, 150), max_pages=1, seconds=0.5)
     share = float(line.split("at most ")[2].split(" %")[0]) / 100
@@ -126,7 +128,7 @@ def only(facets: Facets, rows: list[int]) -> Facets:
     return replace(facets, enabled=enabled)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEADY)
 @pytest.mark.parametrize("first", ["nest", "net"])
 def test_pinned_facets_stay_and_nothing_meets_them(method, first, tmp_path):
     write_layout(pack(only(SHARDS, [3, 4, 5, 9, 20]), first, (100, 90), seconds=0.1), tmp_path / "pins.yaml")
@@ -141,6 +143,70 @@ def test_pinned_facets_stay_and_nothing_meets_them(method, first, tmp_path):
     assert collisions(layout, 0 if "net" in (method, first) else 2) == 0
     # Rows never go back to a room that the next facet by id does not fit.
     assert method == "rows" or (layout.page[~kept] == 0).any()
+
+
+PLACED = """quilt_display: 1
+mesh: {mesh}
+resolution: {{pixels_per_metre: 500}}
+facets:
+  1: {{name: front, place: {{at: [100, 50], rotate: 90}}}}
+  3: {{place: {{page: 2, at: [0, 8], mirror: true}}}}
+"""
+
+
+def placed_cube(folder: Path, old: str = "", new: str = "") -> Facets:
+    path = folder / "placed.yaml"
+    path.write_text(PLACED.format(mesh=MODELS / "cube5.obj").replace(old, new))
+    return load_display(load_display_file(path))
+
+
+@pytest.mark.parametrize("method", STEADY)
+def test_facets_stay_where_the_display_file_has_them(method, tmp_path):
+    facets = placed_cube(tmp_path)
+    layout = pack(facets, method, (700, 500), seconds=0.1)
+    check_layout(layout)
+    assert facets.size[0].tolist() == [266, 150]
+    # A quarter turn clockwise takes facet pixel (0, 150), the lower left corner, to the place's own.
+    assert layout.quilt_from_facet[0].tolist() == [[0, -1, 250], [1, 0, 50]]
+    assert layout.quilt_from_facet[2].tolist() == [[-1, 0, 266], [0, 1, 8]]
+    assert layout.page[[0, 2]].tolist() == [0, 1]
+    assert collisions(layout, 0 if method == "net" else 2) == 0
+    assert (layout.page[[1, 3, 4]] < 2).all()
+
+
+def test_the_layout_of_the_pins_comes_before_the_display_file(tmp_path):
+    facets = placed_cube(tmp_path)
+    pins = pack(only(replace(facets, places=None), [0, 1]), "rows", (600, 500))
+    layout = pack(facets, pins=pins, seconds=0.1)
+    assert layout.quilt_from_facet[:2].tolist() == pins.quilt_from_facet.tolist()
+    assert layout.quilt_from_facet[2].tolist() == [[-1, 0, 266], [0, 1, 8]]
+    assert layout.pages.tolist() == [[600, 500]] * 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wishes", "message"),
+    [
+        ("", "", {"size": None}, "5:27: facets.1.place: a facet with a place needs a page of a"),
+        ("page: 2, at: [0, 8]", "at: [200, 60]", {}, "6:14: facets.3.place: facets 1 and 3 overlap in 74"),
+        (
+            "[0, 8]",
+            "[500, 8]",
+            {},
+            "6:14: facets.3.place: facet 3: corner 1 at (766, 157.445) lies",
+        ),
+        ("", "", {"align": 8}, "5:27: facets.1.place: pixel (100, 50) is no multiple of the alignment to 8"),
+        (
+            "",
+            "",
+            {"page_facets": 2},
+            "5:27: facets.1.place: a facet with a place and limits of a page cannot",
+        ),
+    ],
+)
+def test_places_that_cannot_be(old, new, wishes, message, tmp_path):
+    facets = placed_cube(tmp_path, old, new)
+    (line,) = said(facets, "rects", **{"size": (700, 500), **wishes})
+    assert line.startswith(f"{tmp_path / 'placed.yaml'}:{message}")
 
 
 def test_pins_may_be_all_there_is():

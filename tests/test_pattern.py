@@ -15,7 +15,7 @@ from quiltcli.errors import OutputError
 from quiltcli.exr import read_exr
 from quiltcli.glyphs import HEIGHT, text_mask, text_width
 from quiltcli.layout import pixel_owners
-from quiltcli.pattern import KINDS, Piece, corner_letter, draw, facet_color, piece, roomiest
+from quiltcli.pattern import KINDS, Piece, beside_corner, corner_letter, draw, facet_color, piece, roomiest
 from quiltcli.patternfiles import page_pattern, write_patterns
 from quiltcli.unmap import facet_image, page_of
 from quiltcli.unmapfiles import unmap
@@ -274,3 +274,27 @@ def test_the_border_leaves_the_piece_alone():
     facet = Piece(1, "", (3, 3), POLYGON, np.ones((3, 3), dtype=bool), 8)
     assert facet.border.sum() == 8
     assert facet.inside.all()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_letters_clear_both_sides_of_their_corner(turned):
+    notched = np.array([[0.0, 0], [90, 0], [90, 30], [30, 30], [30, 90], [0, 90], [20, 45]])
+    polygon = notched[::-1] if turned else notched
+    for at in range(len(polygon)):
+        spot = beside_corner(polygon, at, 4)
+        away = float(np.hypot(*(spot - polygon[at])))
+        distances = []
+        for other in (at - 1, (at + 1) % len(polygon)):
+            side = polygon[other] - polygon[at]
+            normal = np.array((-side[1], side[0])) / np.hypot(*side)
+            distances.append(abs(float((spot - polygon[at]) @ normal)))
+        np.testing.assert_allclose(distances[0], distances[1], atol=1e-9)
+        assert away <= 12 + 1e-9
+        assert distances[0] > 3.59 or away > 12 - 1e-9
+        x, y = spot
+        following = np.roll(polygon, -1, axis=0)
+        crossed = [
+            (a[1] <= y) != (b[1] <= y) and x > a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            for a, b in zip(polygon, following, strict=True)
+        ]
+        assert sum(crossed) % 2 == 1

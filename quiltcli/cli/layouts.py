@@ -17,8 +17,9 @@ from quiltcli.cli.options import ASPECT, PATH, SIZE
 @click.option(
     "--method",
     help="auto (the best of those that follow), rows (by id, as people read), rects (bounding rectangles),"
-    " maxrects, nest (outlines interlock), or net (neighbours stay neighbours at any angle: each facet's"
-    " raster is then taken from the quilt, not from the display).",
+    " maxrects, nest (outlines interlock), net (neighbours stay neighbours at any angle: each facet's"
+    " raster is then taken from the quilt, not from the display), or sparrow (a search of minutes for few"
+    " facets, by the optional package spyrrow; its layouts differ from run to run).",
 )
 @click.option(
     "--size",
@@ -38,7 +39,7 @@ from quiltcli.cli.options import ASPECT, PATH, SIZE
 @click.option(
     "--seconds",
     type=click.FloatRange(min=0, min_open=True),
-    help="Effort, 10 by default: seconds on a slow computer; every computer packs the same way.",
+    help="Effort, 10 by default: seconds on a slow computer; every computer packs alike (not sparrow).",
 )
 @click.option("--picture", type=PATH, help="Draw the layout, as .png or .svg.")
 def pack(

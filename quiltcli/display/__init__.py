@@ -6,6 +6,7 @@ from quiltcli.display.build import build_facets, load_display
 from quiltcli.display.edges import SharedEdges
 from quiltcli.display.facets import (
     Facets,
+    Places,
     convex_parts,
     corner_pixels,
     lit_facets,
@@ -16,6 +17,7 @@ from quiltcli.display.facets import (
 
 __all__ = [
     "Facets",
+    "Places",
     "SharedEdges",
     "build_facets",
     "convex_parts",

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from quiltcli.display.check import called, check_polygons
-from quiltcli.display.facets import Facets
+from quiltcli.display.facets import Facets, Places
 from quiltcli.display.frame import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
 from quiltcli.display.polygon import area_vectors
 from quiltcli.errors import DisplayError, Problem
@@ -66,6 +66,22 @@ def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
         mirrored=mirrored,
         uv=mesh.uv,
         path=str(spec.source.path),
+        places=_places(spec),
+    )
+
+
+def _places(spec: DisplayFile) -> Places | None:
+    """The places in the quilt that the file gives."""
+    given = {facet: choice.place for facet, choice in sorted(spec.facets.items()) if choice.place is not None}
+    if not given:
+        return None
+    return Places(
+        facet=np.array(list(given), dtype=np.int32),
+        page=np.array([place.page - 1 for place in given.values()], dtype=np.int32),
+        turn=np.array([int(place.rotate) // 90 for place in given.values()], dtype=np.int32),
+        mirror=np.array([place.mirror for place in given.values()], dtype=np.bool_),
+        corner=np.array([place.at for place in given.values()], dtype=np.int32),
+        source=spec.source,
     )
 
 

@@ -3,13 +3,44 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from quiltcli.display.edges import SharedEdges, find_shared_edges
 from quiltcli.display.polygon import convex, ear_clip, plane_coordinates
+from quiltcli.errors import Problem
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, facet_from_world, segments
+from quiltcli.yamlfile import Source
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where n facets are to stay in the quilt.
+
+    A facet's image is mirrored left to right if `mirror`, then turned clockwise by quarter turns, then
+    put with its top-left pixel at `corner`.
+
+    Attributes:
+        facet: (n,) ids, ascending.
+        page: (n,) 0-based page.
+        turn: (n,) quarter turns, 0 to 3.
+        mirror: (n,) whether the image is mirrored.
+        corner: (n, 2) pixel x, y of the page.
+        source: finds lines in the display file.
+    """
+
+    facet: Int32Array
+    page: Int32Array
+    turn: Int32Array
+    mirror: BoolArray
+    corner: Int32Array
+    source: Source
+
+    def problem(self, key: Sequence[str | int], message: str) -> Problem:
+        """A problem with the place of a facet: the key begins with `facets` and its id."""
+        return self.source.problem((*key[:2], "place"), message)
 
 
 @dataclass(frozen=True)
@@ -33,6 +64,7 @@ class Facets:
         mirrored: (F,) facets whose image is mirrored because the user asked for it.
         uv: (C, 2) texture coordinates of the mesh, v up, or None.
         path: the display file as the user named it, for messages.
+        places: facets whose place in the quilt the display file gives; None when it gives none.
     """
 
     names: tuple[str, ...]
@@ -48,6 +80,7 @@ class Facets:
     mirrored: BoolArray
     uv: FloatArray | None
     path: str
+    places: Places | None = None
 
     @property
     def count(self) -> int:

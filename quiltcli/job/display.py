@@ -17,6 +17,7 @@ from quiltcli.job.base import (
     Items,
     MeshPath,
     Model,
+    Natural,
     Number,
     OneOf,
     Positive,
@@ -119,6 +120,19 @@ class ResolutionSpec(Model):
         yield from exactly_one(self, "pixels_per_metre", "facet_pixels")
 
 
+class PlaceOnPage(Model):
+    """Where a facet's image is to stay in the quilt, whatever the packing does with the others."""
+
+    page: Count = 1
+    """Page, the first being 1."""
+    at: Annotated[tuple[Natural, Natural], Items(2)]
+    """Pixel x, y of the page where the image's top-left pixel lies, after mirroring and turning."""
+    rotate: Annotated[Number, AfterValidator(_quarter), WithJsonSchema({"enum": [0, 90, 180, 270]})] = 0
+    """Quarter turn of the image in the quilt, clockwise, degrees."""
+    mirror: bool = False
+    """Mirror the image left to right in the quilt, before it is turned."""
+
+
 class FacetSpec(Model):
     """What is different on one facet."""
 
@@ -134,6 +148,8 @@ class FacetSpec(Model):
     """Mirror the image, for rear projection."""
     enabled: bool = True
     """Whether the facet is rendered at all."""
+    place: PlaceOnPage | None = None
+    """Fixed place in the quilt; facets without one are packed around it."""
 
 
 class DisplayFile(FileModel):

@@ -25,6 +25,7 @@ from quiltcli.job.base import (
 )
 
 # Names of the packing stage, which comes later; known here so that a wrong one is shown in its line.
+# A method that reads a clock is not among them: machines that share a job would disagree about its layout.
 PACKING_METHODS = ("auto", "rows", "rects", "maxrects", "nest", "net")
 
 

@@ -104,10 +104,16 @@ def _facet(
     facet = int(layout.facet[row])
     yield Shape(polygon, color, _EDGE, 1)
     centre, radius = _roomiest(polygon)
-    size = min(1.05 * radius / max(1.0, 0.45 * len(str(facet))), 64)
+    name = names[facet - 1] if facet <= len(names) else ""
+    # Id and name lie one under the other, inside the circle and clear of the arrow.
+    size = min((0.8 if name else 1.05) * radius / max(1.0, 0.45 * len(str(facet))), 64)
     if size < 5:
         return
-    yield Label(centre[0], centre[1], size, str(facet), _FACET_INK, "middle")
+    small = min(size * 0.5, 2.4 * radius / max(1, len(name))) if name else 0.0
+    small = small if small >= 5 else 0.0
+    yield Label(centre[0], centre[1] - 0.55 * small, size, str(facet), _FACET_INK, "middle")
+    if small:
+        yield Label(centre[0], centre[1] + 0.5 * size, small, name, _FACET_INK, "middle")
     up = -layout.quilt_from_facet[row, :, 1]
     up = up / np.linalg.norm(up)
     if radius > 14:  # room for an arrow
@@ -117,10 +123,6 @@ def _facet(
         base = tip - up * half * 1.3
         arrow = np.stack((tip, base + across * half, base - across * half))
         yield Shape(arrow, _FACET_INK, _FACET_INK, 0)
-    name = names[facet - 1] if facet <= len(names) else ""
-    small = min(size * 0.5, 2.4 * radius / max(1, len(name)))
-    if name and small >= 5:
-        yield Label(centre[0], centre[1] + size * 0.5 + small * 0.6, small, name, _FACET_INK, "middle")
 
 
 def _color(hue: float, value: float, saturation: float) -> str:

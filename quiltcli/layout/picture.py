@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 from quiltcli.display import Facets
 from quiltcli.errors import OutputError, Problem
 from quiltcli.layout.drawing import PAPER, draw_layout
 from quiltcli.layout.record import Layout
 from quiltcli.layout.shapes import Drawing, Label, Shape
+from quiltcli.layout.svg import svg_document, svg_label, svg_polygon
 from quiltcli.wholefile import whole_file, write_text
 
 _FINER = 2  # drawn this much larger, then reduced: smooth edges
@@ -44,28 +44,11 @@ def layout_picture(
 
 def svg_text(drawing: Drawing) -> str:
     """The drawing as an SVG document."""
-    size = f'width="{drawing.width}" height="{drawing.height}"'
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {drawing.width} {drawing.height}"'
-        ' font-family="sans-serif">',
-        f'<rect {size} fill="{PAPER}"/>',
-        *(_svg_shape(item) if isinstance(item, Shape) else _svg_label(item) for item in drawing.items),
-        "</svg>",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _svg_shape(shape: Shape) -> str:
-    points = " ".join(f"{x:.2f},{y:.2f}" for x, y in shape.points)
-    stroke = f' stroke="{shape.outline}" stroke-width="{shape.width:g}"' if shape.width else ""
-    return f'<polygon points="{points}" fill="{shape.fill}"{stroke} stroke-linejoin="round"/>'
-
-
-def _svg_label(label: Label) -> str:
-    place = f'x="{label.x:.2f}" y="{label.y:.2f}" font-size="{label.size:.1f}" fill="{label.color}"'
-    return (
-        f'<text {place} text-anchor="{label.anchor}" dominant-baseline="central">{escape(label.text)}</text>'
+    items = (
+        svg_polygon(item, ' stroke-linejoin="round"') if isinstance(item, Shape) else svg_label(item)
+        for item in drawing.items
     )
+    return svg_document(drawing.width, drawing.height, PAPER, items)
 
 
 def _write_png(drawing: Drawing, path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from quiltcli.packing.attempt import Attempt, Method
 from quiltcli.packing.choice import layout_for
-from quiltcli.packing.methods import DEFAULT_METHOD, METHODS
+from quiltcli.packing.methods import DEFAULT_METHOD, METHODS, STEADY
 from quiltcli.packing.model import PackInput, PackResult
 from quiltcli.packing.pack import pack
 from quiltcli.packing.target import CANVASES, DEFAULT_SECONDS, read_aspect
@@ -12,6 +12,7 @@ __all__ = [
     "DEFAULT_METHOD",
     "DEFAULT_SECONDS",
     "METHODS",
+    "STEADY",
     "Attempt",
     "Method",
     "PackInput",

@@ -6,21 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from quiltcli.packing.dice import Dice
 from quiltcli.packing.model import PackInput, PackResult, extents, page_count, used_height
-from quiltcli.packing.mosaic import Cells, cells_of, pack_mosaic
+from quiltcli.packing.mosaic import Piece, pack_mosaic, pieces_of
+from quiltcli.packing.settle import settle
 from quiltcli.packing.shapes import Shapes
-
-
-class Dice:
-    """Numbers that look random and are the same everywhere, for ever (Knuth's MMIX generator)."""
-
-    def __init__(self) -> None:
-        self._state = 1
-
-    def below(self, limit: int) -> int:
-        """A whole number from 0 to limit − 1."""
-        self._state = (self._state * 6364136223846793005 + 1442695040888963407) % (1 << 64)
-        return (self._state >> 33) % limit
 
 
 @dataclass(frozen=True)
@@ -31,31 +21,29 @@ class Mosaic:
         shapes: what to place.
         cell: side of a cell, pixels.
         steps: changes to try; 0 takes the mosaic as the order by area has it.
-        band: rows of cells above the lowest taken one that are looked at; 0 looks at all.
     """
 
     shapes: Shapes
     cell: int
     steps: int
-    band: int = 0
-    _cells: list[list[Cells]] = field(default_factory=list)
+    _pieces: list[list[Piece]] = field(default_factory=list)
 
     def run(self, wanted: PackInput) -> PackResult:
-        """The best of all mosaics that were tried."""
-        if not self._cells:
-            self._cells.extend(cells_of(wanted, self.shapes, self.cell))
+        """The best of all mosaics that were tried, settled."""
+        if not self._pieces:
+            self._pieces.extend(pieces_of(wanted, self.shapes, self.cell))
         order = np.lexsort((np.arange(self.shapes.area.size), -self.shapes.area)).tolist()
         locks = [-1] * len(order)
-        best = pack_mosaic(wanted, self._cells, self.cell, order, locks, self.band)
+        best = pack_mosaic(wanted, self._pieces, self.cell, order, locks)
         least = _cost(wanted, best)
         dice = Dice()
         for _ in range(self.steps):
             new_order, new_locks = self._changed(order, locks, dice)
-            result = pack_mosaic(wanted, self._cells, self.cell, new_order, new_locks, self.band)
+            result = pack_mosaic(wanted, self._pieces, self.cell, new_order, new_locks)
             cost = _cost(wanted, result)
             if cost <= least:
                 best, least, order, locks = result, cost, new_order, new_locks
-        return best
+        return settle(wanted, self.shapes, best)
 
     def _changed(self, order: list[int], locks: list[int], dice: Dice) -> tuple[list[int], list[int]]:
         """One or two changes: two shapes trade places in the order, or one is bound to an orientation."""

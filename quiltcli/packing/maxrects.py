@@ -29,9 +29,30 @@ def size_orders(wanted: PackInput) -> list[IntArray]:
     return [np.lexsort(key) for key in keys]
 
 
-def place_maxrects(wanted: PackInput, order: IntArray) -> PackResult:
-    """Place facets in this order, each in the first room that takes it."""
+def allowed_turns(wanted: PackInput, lock: IntArray | None = None) -> list[tuple[int, ...]]:
+    """Quarter turns each facet may have, of none and one.
+
+    Args:
+        wanted: what to place, and where.
+        lock: (n,) the only turn a facet may have, −1 for either. One that no page takes is ignored.
+    """
+    if lock is None:
+        return [(0, 1)] * len(wanted.size)
+    size = np.where((lock == 1)[:, None], wanted.size[:, ::-1], wanted.size)
+    free = (lock < 0) | (size > wanted.page).any(axis=1)
+    return [(0, 1) if either else (turn,) for either, turn in zip(free.tolist(), lock.tolist(), strict=True)]
+
+
+def place_maxrects(wanted: PackInput, order: IntArray, lock: IntArray | None = None) -> PackResult:
+    """Place facets in this order, each in the first room that takes it.
+
+    Args:
+        wanted: what to place, and where.
+        order: facets, the first to be placed first.
+        lock: (n,) quarter turns as for `allowed_turns`.
+    """
     count = len(order)
+    turns = allowed_turns(wanted, lock)
     page, turn = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
     corner = np.zeros((count, 2), dtype=np.int32)
     grown = grown_size(wanted)
@@ -44,7 +65,7 @@ def place_maxrects(wanted: PackInput, order: IntArray) -> PackResult:
                 fresh = rooms[-1].page + 1 if at > len(wanted.rooms) else wanted.begun
                 rooms.append(Room(fresh, 0, 0, *wanted.page))
                 free.append(_whole(rooms[at]))
-            spot = _best_spot(free[at], rooms[at], size, taken)
+            spot = _best_spot(free[at], rooms[at], size, taken, turns[i])
             if spot is not None:
                 x, y, turn[i] = spot
                 page[i], corner[i] = rooms[at].page, (x, y)
@@ -60,12 +81,13 @@ def _whole(room: Room) -> IntArray:
 
 
 def _best_spot(
-    free: IntArray, room: Room, size: tuple[int, int], grown: tuple[int, int]
+    free: IntArray, room: Room, size: tuple[int, int], grown: tuple[int, int], turns: tuple[int, ...]
 ) -> tuple[int, int, int] | None:
     """Left, top and quarter turns where a rectangle ends highest, then leftmost; None without room."""
     best = None
     right, bottom = room.left + room.width, room.top + room.height
-    for turn, ((w, h), (a, b)) in enumerate(((size, grown), (size[::-1], grown[::-1]))):
+    for turn in turns:
+        (w, h), (a, b) = (size[::-1], grown[::-1]) if turn else (size, grown)
         fits = (free[:, 2] - free[:, 0] >= a) & (free[:, 3] - free[:, 1] >= b)
         fits &= (free[:, 0] + w <= right) & (free[:, 1] + h <= bottom)
         if fits.any():

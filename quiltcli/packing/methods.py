@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import zip_longest
+from collections.abc import Callable, Mapping
 
 from quiltcli.packing.attempt import Attempt, Method
 from quiltcli.packing.model import PackInput
 from quiltcli.packing.nest import nest_attempts
 from quiltcli.packing.net import net_attempts
 from quiltcli.packing.rects import maxrects_attempts, rects_attempts, rows_attempts
+from quiltcli.packing.sparrow import sparrow_attempts
 
 _SPARSE = 0.7  # of its rectangles a display must fill for rectangles to have a chance
 
 
-def auto_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
-    """All that `rects` and `nest` do, in turn; rectangles only for facets that nearly fill theirs."""
-    rects = rects_attempts(wanted, seconds / 2)
-    nest = nest_attempts(wanted, seconds / 2)
-    if nest[0].area <= _SPARSE * rects[0].area:
-        return nest_attempts(wanted, seconds)
-    return [attempt for both in zip_longest(rects, nest) for attempt in both if attempt is not None]
+def _auto(wanted: PackInput, seconds: float) -> list[list[Attempt]]:
+    """All that `rects` and `nest` do; rectangles only for facets that nearly fill theirs."""
+    rects, nest = rects_attempts(wanted, seconds), nest_attempts(wanted, seconds)
+    return [nest] if nest[0].area <= _SPARSE * rects[0].area else [rects, nest]
+
+
+def _alone(attempts: Callable[[PackInput, float], list[Attempt]]) -> Method:
+    """A method of one list."""
+    return lambda wanted, seconds: [attempts(wanted, seconds)]
 
 
 METHODS: Mapping[str, Method] = {
-    "auto": auto_attempts,
-    "rows": rows_attempts,
-    "rects": rects_attempts,
-    "maxrects": maxrects_attempts,
-    "nest": nest_attempts,
-    "net": net_attempts,
+    "auto": _auto,
+    "rows": _alone(rows_attempts),
+    "rects": _alone(rects_attempts),
+    "maxrects": _alone(maxrects_attempts),
+    "nest": _alone(nest_attempts),
+    "net": _alone(net_attempts),
+    "sparrow": lambda wanted, seconds: [*_auto(wanted, seconds), sparrow_attempts(wanted, seconds)],
 }
+STEADY = tuple(name for name in METHODS if name != "sparrow")
+"""Methods that give the same layout every time: they read no clock."""
+
 DEFAULT_METHOD = "auto"

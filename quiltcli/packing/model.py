@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
+from quiltcli.layout.fromuv import MIRROR, QUARTER_TURNS
 from quiltcli.layout.record import PIXEL_TOLERANCE
 
 FAR = 1 << 30
@@ -112,3 +113,12 @@ def used_height(wanted: PackInput, result: PackResult) -> int:
 def page_count(result: PackResult) -> int:
     """Number of pages a result takes."""
     return int(result.page.max(initial=-1)) + 1
+
+
+def quilt_from_facet(size: Int32Array, result: PackResult) -> FloatArray:
+    """Whole-pixel maps (n, 2, 3) that put rasters of `size` (n, 2) where the result has them."""
+    turns = QUARTER_TURNS[result.turn]
+    turns = np.where(result.mirror[:, None, None], turns @ MIRROR, turns)
+    # The turned raster's lowest corner goes to `corner`, whichever corner that is now.
+    low = np.minimum(turns * size[:, None, :], 0).sum(axis=2)
+    return np.concatenate((turns, (result.corner - low)[:, :, None]), axis=2)

@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from functools import partial
 
+import numpy as np
+
 from quiltcli.packing.attempt import SLOW, Attempt, least_width
 from quiltcli.packing.improve import Mosaic
 from quiltcli.packing.model import PackInput, PackResult
+from quiltcli.packing.pile import Pile
+from quiltcli.packing.settle import settle
 from quiltcli.packing.shapes import Shapes, facet_shapes
 from quiltcli.packing.shelves import ShelfRule, pack_shelves
 
@@ -23,6 +27,9 @@ _RULES = (
 )
 FEW = 120
 """Facets up to which a mosaic pays."""
+
+_OWN, _TRIANGLES, _RECTANGLES = 0.5, 0.58, 0.9
+"""What tells shapes that are all different: sizes to a shape, and the part of its box that it fills."""
 
 _IMPROVING = 0.3  # of the time, for improving the mosaic on one page width
 
@@ -48,14 +55,13 @@ def shape_attempts(wanted: PackInput, shapes: Shapes, seconds: float) -> list[At
         for rule in _RULES
     ]
     if len(wanted.size) > FEW:
-        large = _large_mosaic(wanted, shapes, area)
-        # It takes long, and is worth it only while there is time for much else.
-        return [shelves[0], large, *shelves[1:]] if large.seconds < seconds / 2 else shelves
+        return [_pile(wanted, shapes, area), *shelves] if _unlike(shapes) else shelves
     return [*shelves, *_mosaics(wanted, shapes, area, seconds)]
 
 
 def _shelves(wanted: PackInput, shapes: Shapes, rule: ShelfRule) -> PackResult:
-    return pack_shelves(wanted, shapes, rule)
+    result = pack_shelves(wanted, shapes, rule)
+    return settle(wanted, shapes, result) if len(result.page) <= FEW else result
 
 
 def _shelf_seconds(shapes: Shapes, rule: ShelfRule) -> float:
@@ -81,15 +87,26 @@ def _mosaics(wanted: PackInput, shapes: Shapes, area: float, seconds: float) -> 
     ]
 
 
-def _large_mosaic(wanted: PackInput, shapes: Shapes, area: float) -> Attempt:
-    """A mosaic that looks at a band of the page only; it pays for many shapes that are all different."""
+def _unlike(shapes: Shapes) -> bool:
+    """Whether most shapes are of a size of their own, and neither triangles nor rectangles.
+
+    Those stand well in rows: triangles head up and head down, rectangles as they are.
+    """
+    size = shapes.size[:, 0].astype(np.int64)
+    own = len(np.unique(size, axis=0)) > _OWN * len(size)
+    filled = float(shapes.area.sum() / size.prod(axis=1).sum())
+    return own and _TRIANGLES < filled < _RECTANGLES
+
+
+def _pile(wanted: PackInput, shapes: Shapes, area: float) -> Attempt:
+    """A pile, which pays for many shapes that are all different."""
     heights = shapes.size[:, :, 1]
-    cell = _cell(float(heights.mean()) / 25, wanted.align)
-    band = math.ceil(2 * float(heights.min(axis=1).max()) / cell)
+    cell = _cell(float(heights.mean()) / 22, wanted.align)
+    band = math.ceil(1.4 * float(heights.min(axis=1).max()) / cell)
     rows = float(heights.sum()) / cell
-    bits = math.sqrt(area) / cell * 1.5 * band
-    once = SLOW * (5.5e-4 * len(wanted.size) + rows * (1.5e-6 + 2e-6 * bits / 65536))
-    return Attempt(Mosaic(shapes, cell, 0, band).run, once, area, "shelves", least_width(wanted))
+    bits = math.sqrt(area) / cell * band
+    once = SLOW * (1e-3 * len(wanted.size) + rows * (1.5e-6 + 2e-6 * bits / 65536))
+    return Attempt(Pile(shapes, cell, band).run, once, area, "pile", least_width(wanted))
 
 
 def _cell(pixels: float, align: int) -> int:

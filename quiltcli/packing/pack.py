@@ -12,12 +12,12 @@ import numpy as np
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.display.weld import weld
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
-from quiltcli.layout.fromuv import MIRROR, QUARTER_TURNS, layout_from_polygons
+from quiltcli.geometry import Int32Array, IntArray, segments
+from quiltcli.layout.fromuv import layout_from_polygons
 from quiltcli.layout.record import Layout
 from quiltcli.packing.methods import DEFAULT_METHOD, METHODS
-from quiltcli.packing.model import PackInput, PackResult, page_count
-from quiltcli.packing.pins import free_rooms, joined, pinned
+from quiltcli.packing.model import PackInput, PackResult, page_count, quilt_from_facet
+from quiltcli.packing.pins import all_pins, free_rooms, joined
 from quiltcli.packing.search import best_page, best_pages, largest_page
 from quiltcli.packing.shortage import shortage
 from quiltcli.packing.target import DEFAULT_SECONDS, Target, bad_target
@@ -53,7 +53,8 @@ def pack(
         mirror: whether `nest` and `auto` may mirror rasters.
         page_facets: most facets on a page.
         page_pixels: most raster pixels on a page, what a sending card or port takes.
-        pins: a layout whose facets stay where they are; the others are packed around them.
+        pins: a layout whose facets stay where they are; the others are packed around them, and around
+            those whose place the display file gives.
         seconds: effort, in seconds on a slow computer; the result depends on it, but on no clock.
 
     Raises:
@@ -69,17 +70,17 @@ def pack(
 def pack_target(facets: Facets, target: Target) -> Layout:
     """As `pack`, of a target."""
     raise_all(LayoutError, _bad_arguments(facets, target))
-    pins = pinned(target.pins, facets) if target.pins is not None else None
+    pins = all_pins(facets, target)
     waiting = facets.enabled.copy()
-    if pins is not None and len(pins.facet):
+    if pins is not None:
         waiting[pins.facet - 1] = False
         target = replace(target, size=target.size or (int(pins.pages[-1, 0]), int(pins.pages[-1, 1])))
-    else:
-        pins = None
     rows = np.flatnonzero(waiting)
     raise_all(LayoutError, _too_large(facets, rows, target))
     if pins is not None and not rows.size:
-        return replace(pins, display=facets.path, display_sha256=facets.sha256, path="", place=None)
+        return replace(
+            pins, display=facets.path, display_sha256=facets.sha256, path="", place=None, file_row=None
+        )
     groups = list(_groups(facets, rows, target))
     if len(groups) > 1:
         return _stacked(facets, groups, target)
@@ -98,10 +99,10 @@ def pack_target(facets: Facets, target: Target) -> Layout:
 
 def _packed(wanted: PackInput, target: Target) -> tuple[PackResult, tuple[int, int]]:
     """Places and page size."""
-    attempts = METHODS[target.method](wanted, target.seconds)
+    searches = METHODS[target.method](wanted, target.seconds)
     if target.size is not None:
-        return best_pages(attempts, wanted, target.seconds), target.size
-    return best_page(attempts, wanted, target.seconds, target.aspect)
+        return best_pages(searches, wanted, target.seconds), target.size
+    return best_page(searches, wanted, target.seconds, target.aspect)
 
 
 def _groups(facets: Facets, rows: IntArray, target: Target) -> Iterator[IntArray]:
@@ -155,6 +156,11 @@ def _bad_arguments(facets: Facets, target: Target) -> Iterator[Problem]:
     yield from bad_target(target)
     if not facets.enabled.any():
         yield Problem("no facet is enabled, so there is nothing to pack", file=facets.path)
+    limited = target.page_facets is not None or target.page_pixels is not None
+    if limited and facets.places is not None:
+        facet = int(facets.places.facet[0])
+        message = "a facet with a place and limits of a page cannot be combined"
+        yield facets.places.problem(("facets", facet), message)
     if target.page_pixels is not None and target.page_pixels >= 1:
         pixels = facets.size.astype(np.int64).prod(axis=1)
         for row in np.flatnonzero(facets.enabled & (pixels > target.page_pixels))[:_MOST_PROBLEMS]:
@@ -245,12 +251,3 @@ def _layout_of_polygons(
     quilt = np.zeros((len(corner_row), 2))
     quilt[page[corner_row] >= 0] = result.polygon
     return layout_from_polygons(facets, quilt, page, pages, padding=wanted.padding, method=method)
-
-
-def quilt_from_facet(size: Int32Array, result: PackResult) -> FloatArray:
-    """Whole-pixel maps (n, 2, 3) that put rasters of `size` (n, 2) where the result has them."""
-    turns = QUARTER_TURNS[result.turn]
-    turns = np.where(result.mirror[:, None, None], turns @ MIRROR, turns)
-    # The turned raster's lowest corner goes to `corner`, whichever corner that is now.
-    low = np.minimum(turns * size[:, None, :], 0).sum(axis=2)
-    return np.concatenate((turns, (result.corner - low)[:, :, None]), axis=2)

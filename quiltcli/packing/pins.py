@@ -1,4 +1,4 @@
-"""Facets that stay where an existing layout has them, and the rooms that leaves."""
+"""Facets that stay where an existing layout or the display file has them, and the rooms that leaves."""
 
 from __future__ import annotations
 
@@ -7,15 +7,85 @@ from dataclasses import replace
 
 import numpy as np
 
-from quiltcli.display import Facets
+from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import IntArray
+from quiltcli.geometry import IntArray, segments
 from quiltcli.layout.align import misfits
+from quiltcli.layout.check import check_layout
 from quiltcli.layout.record import Layout, quilt_polygons
 from quiltcli.packing.maxrects import without
-from quiltcli.packing.model import Room
+from quiltcli.packing.model import PackResult, Room, quilt_from_facet
+from quiltcli.packing.target import Target
 
 _MOST_ROOMS = 64  # a page
+
+
+def all_pins(facets: Facets, target: Target) -> Layout | None:
+    """Everything that is to stay: what the layout of the pins has, and what the display file gives a place.
+
+    A facet that has both stays where the layout has it.
+
+    Raises:
+        LayoutError: they do not belong to the display, meet each other, or lie outside their pages.
+    """
+    given = pinned(target.pins, facets) if target.pins is not None else None
+    own = _placed_by_display(facets, given, target)
+    if own is None:
+        return given if given is not None and len(given.facet) else None
+    both = own if given is None or not len(given.facet) else joined(given, own)
+    check_layout(replace(both, place=own.place, file_row=both.facet.astype(np.int64)))
+    return both
+
+
+def _placed_by_display(facets: Facets, given: Layout | None, target: Target) -> Layout | None:
+    """The facets whose place the display file gives, as a layout; None when it gives none."""
+    places = facets.places
+    if places is None:
+        return None
+    row = places.facet - 1
+    free = facets.enabled[row] & ~np.isin(places.facet, given.facet if given is not None else [])
+    on = np.flatnonzero(free)
+    if not on.size:
+        return None
+    size = target.size or (given.pages[-1] if given is not None and len(given.facet) else None)
+    if size is None:
+        message = "a facet with a place needs a page of a given size (--size, or size under layout:)"
+        raise LayoutError(places.problem(("facets", int(places.facet[on[0]])), message))
+    odd = on[(places.corner[on] % target.align > 0).any(axis=1)]
+    raise_all(
+        LayoutError,
+        (
+            places.problem(
+                ("facets", int(places.facet[at])),
+                f"pixel ({places.corner[at, 0]}, {places.corner[at, 1]}) is no multiple of the"
+                f" alignment to {target.align}",
+            )
+            for at in odd
+        ),
+    )
+    begun = [] if given is None or not len(given.facet) else given.pages.tolist()
+    count = max(len(begun), int(places.page[on].max()) + 1)
+    row = row[on]
+    corner_row, _ = segments(facets.corner_start)
+    result = PackResult(places.page[on], places.turn[on], places.mirror[on], places.corner[on])
+    return Layout(
+        facet=places.facet[on],
+        page=places.page[on],
+        size=facets.size[row],
+        quilt_from_facet=quilt_from_facet(facets.size[row], result),
+        origin=facets.origin[row],
+        du=facets.du[row],
+        dv=facets.dv[row],
+        corner_start=np.concatenate(([0], np.cumsum(np.diff(facets.corner_start)[row]))),
+        polygon=corner_pixels(facets)[np.isin(corner_row, row)],
+        pages=np.array([*begun, *[size] * (count - len(begun))], dtype=np.int32),
+        padding=target.padding,
+        method=target.method,
+        display=facets.path,
+        display_sha256=facets.sha256,
+        place=places,
+        file_row=places.facet[on].astype(np.int64),
+    )
 
 
 def pinned(pins: Layout, facets: Facets) -> Layout:
@@ -73,6 +143,8 @@ def joined(pins: Layout, rest: Layout) -> Layout:
         corner_start=np.concatenate((pins.corner_start, pins.corner_start[-1] + rest.corner_start[1:])),
         polygon=np.concatenate((pins.polygon, rest.polygon)),
         pages=np.concatenate((pins.pages, fresh)).astype(np.int32),
+        place=None,
+        file_row=None,
     )
     return rows_of(both, np.argsort(both.facet, kind="stable"))
 

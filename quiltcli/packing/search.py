@@ -10,9 +10,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import TypeAlias
 
 import numpy as np
 
+from quiltcli.geometry import FloatArray
 from quiltcli.packing.attempt import Attempt
 from quiltcli.packing.model import PackInput, PackResult, extents, page_count, used_height
 
@@ -25,40 +27,54 @@ _SCOUTING = 0.4  # of the time is for finding good widths
 _FOLLOWED = 6  # widths on which the other attempts follow
 
 
-def best_pages(attempts: Sequence[Attempt], wanted: PackInput, seconds: float) -> PackResult:
+def best_pages(searches: Sequence[Sequence[Attempt]], wanted: PackInput, seconds: float) -> PackResult:
     """Pack on pages of the wanted size: fewest pages, then least height on the last one.
 
-    Stops at once when no fewer pages are possible. The first attempt is always made.
+    Stops at once when no fewer pages are possible. The first attempt of each list is always made.
     """
     best: tuple[tuple[int, int], PackResult] | None = None
-    spent = 0.0
-    least = min(attempt.area for attempt in attempts) / (wanted.page[0] * wanted.page[1])
-    for attempt in attempts:
-        # Stopping, not skipping: more seconds then never lead to fewer attempts.
-        if best is not None and spent + attempt.seconds > seconds:
-            break
-        spent += attempt.seconds
-        result = attempt.run(wanted)
-        cost = (page_count(result), used_height(wanted, result))
-        if best is None or cost < best[0]:
-            best = (cost, result)
-        if not wanted.begun and cost[0] <= least + 1:
-            break
+    least = min(attempt.area for attempts in searches for attempt in attempts) / math.prod(wanted.page)
+    for attempts in searches:
+        spent = 0.0
+        for number, attempt in enumerate(attempts):
+            # Stopping, not skipping: more seconds then never lead to fewer attempts.
+            if number and spent + attempt.seconds > seconds:
+                break
+            spent += attempt.seconds
+            result = attempt.run(wanted)
+            cost = (page_count(result), used_height(wanted, result))
+            if best is None or cost < best[0]:
+                best = (cost, result)
+            if not wanted.begun and cost[0] <= least + 1:
+                return best[1]
     assert best is not None
     return best[1]
 
 
 def best_page(
-    attempts: Sequence[Attempt], wanted: PackInput, seconds: float, aspect: Fraction | None = None
+    searches: Sequence[Sequence[Attempt]], wanted: PackInput, seconds: float, aspect: Fraction | None = None
 ) -> tuple[PackResult, tuple[int, int]]:
     """The smallest single page, of a chosen aspect (width / height) or of any.
 
-    The first attempt of each family is made on a range of widths, the others on the widths that were
-    best for it. Ties go to the squarest, then the one with fewest turned facets, then the narrowest.
-    A page more than three times as long as wide is taken only when there is no other, or when that
-    is the aspect. Pages are at most 16384 pixels wide and high; a display too large for one is packed
-    on several of that size.
+    In each list of attempts, the first of each family is made on a range of widths, the others on the
+    widths that were best for it. Ties go to the squarest, then the one with fewest turned facets, then
+    the narrowest. A page more than three times as long as wide is taken only when there is no other, or
+    when that is the aspect. Pages are at most 16384 pixels wide and high; a display too large for one is
+    packed on several of that size.
     """
+    found = [_best_page(attempts, wanted, seconds, aspect) for attempts in searches]
+    pages = [best for best in found if best is not None]
+    if pages:
+        _, result, size = min(pages, key=lambda best: best[0])
+        return result, size
+    largest = largest_page(aspect)
+    return best_pages(searches, replace(wanted, page=largest), seconds), largest
+
+
+def _best_page(
+    attempts: Sequence[Attempt], wanted: PackInput, seconds: float, aspect: Fraction | None
+) -> _Best | None:
+    """What one list of attempts comes to; None when nothing fits a page."""
     tries = _Tries(wanted, aspect)
     scouts: dict[str, int] = {}
     for number, attempt in enumerate(attempts):
@@ -66,14 +82,13 @@ def best_page(
     for number in scouts.values():
         attempt = attempts[number]
         share = _SCOUTING * seconds / len(scouts) / max(attempt.seconds, 1e-9)
-        tries.scout(number, attempt, int(min(max(share, 3), _WIDTHS)))
+        # Thousands of facets fill one width as well as another.
+        fewest = 3 if 3 * attempt.seconds <= seconds else 1
+        tries.scout(number, attempt, int(min(max(share, fewest), _WIDTHS)))
     for number, attempt in enumerate(attempts):
         if number not in scouts.values():
             tries.follow(number, attempt, scouts[attempt.family], seconds)
-    if tries.best is not None:
-        return tries.best[1], tries.best[2]
-    largest = largest_page(aspect)
-    return best_pages(attempts, replace(wanted, page=largest), seconds), largest
+    return tries.best
 
 
 def largest_page(aspect: Fraction | None) -> tuple[int, int]:
@@ -91,7 +106,8 @@ def height_of(width: int, aspect: Fraction) -> int:
     return 2 * math.ceil(width / aspect / 2)
 
 
-_Cost = tuple[bool, int, int, int, int, int]
+_Cost: TypeAlias = tuple[bool, int, int, int, int, int]
+_Best: TypeAlias = tuple[_Cost, PackResult, tuple[int, int]]
 
 
 @dataclass
@@ -102,15 +118,15 @@ class _Tries:
     aspect: Fraction | None
     spent: float = 0.0
     costs: dict[tuple[int, int], _Cost] = field(default_factory=dict)
-    best: tuple[_Cost, PackResult, tuple[int, int]] | None = None
+    best: _Best | None = None
 
     def scout(self, number: int, attempt: Attempt, count: int) -> None:
         """Make an attempt on this many widths: spread out, or closing in on the least of the aspect."""
         if self.aspect is None:
-            sides = math.sqrt(attempt.area) * np.linspace(0.8, 1.4, count)
-            whole = {
-                _rounded(max(int(side), attempt.narrowest)) for side in (*sides, self.wanted.size[:, 0].max())
-            }
+            sides = (math.sqrt(attempt.area) * (0.8 + 0.6 * spread(count))).tolist()
+            if count > 1:  # a column of facets may be best
+                sides.append(int(self.wanted.size[:, 0].max()))
+            whole = {_rounded(max(int(side), attempt.narrowest)) for side in sides}
             for width in sorted(width for width in whole if width <= LARGEST_PAGE) or [LARGEST_PAGE]:
                 self._at(number, attempt, width)
             return
@@ -165,6 +181,11 @@ class _Tries:
         if self.best is None or cost < self.best[0]:
             self.best = (cost, result, (w, h))
         return True
+
+
+def spread(count: int) -> FloatArray:
+    """Numbers between 0 and 1, evenly spread, that include those of every lesser count (van der Corput)."""
+    return np.array([int(f"{n:b}"[::-1], 2) / (1 << n.bit_length()) for n in range(1, count + 1)])
 
 
 def _rounded(pixels: int) -> int:

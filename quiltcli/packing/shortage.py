@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from quiltcli.packing.methods import METHODS
+from quiltcli.packing.methods import DEFAULT_METHOD, METHODS, STEADY
 from quiltcli.packing.model import PackInput, PackResult, page_count
 from quiltcli.packing.search import LARGEST_PAGE, best_pages
 from quiltcli.packing.target import Target
@@ -85,5 +85,7 @@ def _fits(wanted: PackInput, target: Target, size: tuple[int, int]) -> bool:
     sides = np.sort(wanted.size, axis=1)
     if (sides > np.sort(size)).any():
         return False
-    attempts = METHODS[target.method](wanted, target.seconds)
-    return page_count(best_pages(attempts, wanted, target.seconds * _SHARE)) <= (target.max_pages or 0)
+    # A search by the clock has no first attempts that are quick; it has those of the default, which are.
+    method = target.method if target.method in STEADY else DEFAULT_METHOD
+    searches = METHODS[method](wanted, target.seconds)
+    return page_count(best_pages(searches, wanted, target.seconds * _SHARE)) <= (target.max_pages or 0)

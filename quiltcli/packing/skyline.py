@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.geometry import IntArray
+from quiltcli.packing.maxrects import allowed_turns
 from quiltcli.packing.model import FAR, PackInput, PackResult, Room, grown_size
 
 
@@ -57,9 +58,10 @@ class _Skyline:
         self.x, self.y = x[np.append(new, True)], y[new].astype(np.int64)
 
 
-def pack_skyline(wanted: PackInput, order: IntArray) -> PackResult:
-    """Place rectangles in this order, each in the first room that takes it."""
+def pack_skyline(wanted: PackInput, order: IntArray, lock: IntArray | None = None) -> PackResult:
+    """Place rectangles in this order, each in the first room that takes it; `lock` as in `allowed_turns`."""
     count = len(order)
+    turns = allowed_turns(wanted, lock)
     page, turn = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
     corner = np.zeros((count, 2), dtype=np.int32)
     grown = grown_size(wanted)
@@ -72,8 +74,12 @@ def pack_skyline(wanted: PackInput, order: IntArray) -> PackResult:
             if at == len(lines):
                 lines.append(_skyline(Room(fresh, 0, 0, *wanted.page)))
                 fresh += 1
-            spots = [lines[at].spot((w, h), (a, b)), lines[at].spot((h, w), (b, a)) if w != h else None]
-            found = [(spot, turns) for turns, spot in enumerate(spots) if spot is not None]
+            line = lines[at]
+            spots = [
+                (line.spot((h, w), (b, a)) if turned else line.spot((w, h), (a, b)), turned)
+                for turned in turns[i]
+            ]
+            found = [(spot, turned) for spot, turned in spots if spot is not None]
             if found:
                 (end, left, top), turn[i] = min(found)
                 lines[at].take(left, b if turn[i] else a, end)

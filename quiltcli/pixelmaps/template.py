@@ -10,7 +10,7 @@ import numpy as np
 from quiltcli.display import Facets
 from quiltcli.glyphs import HEIGHT, text_mask, text_width
 from quiltcli.layout import Layout, pixel_owners
-from quiltcli.pattern import corner_letter, facet_color, roomiest
+from quiltcli.pattern import beside_corner, corner_letter, facet_color, letter_size, roomiest
 from quiltcli.patternfiles import page_pattern, write_png
 from quiltcli.pixelmaps.naming import facet_label, page_files
 from quiltcli.pixelmaps.placing import placed_rows
@@ -76,8 +76,8 @@ def _facet(layout: Layout, row: int, label: str, name: str) -> list[str]:
         lines.append(_text(x, y + 0.72 * half, size, name, "#ff0"))
     lines += _flag(x, y, half)
     for at, corner in enumerate(polygon):
-        size = min(0.3 * radius, 0.25 * float(np.hypot(*(centre - corner))))
-        here = corner + (centre - corner) * 0.25
+        size = letter_size(corner, centre, radius)
+        here = beside_corner(polygon, at, size)
         lines.append(_text(here[0], here[1], size, corner_letter(at), "#0f0"))
     return [*lines, "</g>"]
 

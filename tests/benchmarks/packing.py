@@ -7,20 +7,22 @@ between its marks. Fill is the share of the pages' pixels that lie in facets; se
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+import trimesh
 
 from quiltcli.display import Facets, corner_pixels, load_display
-from quiltcli.geometry import next_in_row
+from quiltcli.geometry import FloatArray, next_in_row
 from quiltcli.job import load_display_file
 from quiltcli.layout import fill
-from quiltcli.packing import METHODS, PackInput, pack
+from quiltcli.packing import METHODS, STEADY, PackInput, pack
 from quiltcli.packing.model import used_height
-from quiltcli.packing.search import best_pages
 from quiltcli.packing.shortage import scaled
 
 MODELS = Path(__file__).parents[2] / "display_models"
@@ -51,11 +53,11 @@ def loaded(name: str) -> Facets:
 
 def own_density(names: Iterable[str]) -> list[list[str]]:
     """A row for every display: fill and seconds of every method on the smallest page it finds."""
-    rows = [["display", "facets", "megapixels", *METHODS, "page of auto"]]
+    rows = [["display", "facets", "megapixels", *STEADY, "page of auto"]]
     for name in names:
         facets = loaded(name)
         cells, page = [], ""
-        for method in METHODS:
+        for method in STEADY:
             start = time.process_time()
             layout = pack(facets, method)
             seconds = time.process_time() - start
@@ -79,18 +81,33 @@ def canvases(names: Iterable[str]) -> list[list[str]]:
     return rows
 
 
-def strip(names: Iterable[str], seconds: float = 10) -> list[list[str]]:
+def strip(names: Iterable[str]) -> list[list[str]]:
     """A row for every display: 16 megapixels of facets on a page 4096 wide and as high as it takes."""
     rows = [["display", "best of auto", "seconds", "aim"]]
     for name in names:
-        wanted = sixteen_megapixels(loaded(name))
-        start = time.process_time()
-        results = [best_pages([attempt], wanted, seconds) for attempt in METHODS["auto"](wanted, seconds)]
-        spent = time.process_time() - start
-        share = area(wanted) / (4096 * min(used_height(wanted, result) for result in results))
-        aim = STRIP[name]
-        rows.append([name, f"{100 * share:.1f} %", f"{spent:.1f}", f"{100 * aim:.1f} %" if aim else "–"])
+        share, seconds = best_share(sixteen_megapixels(loaded(name)), "auto", 10)
+        rows.append([name, percent(share), f"{seconds:.1f}", percent(STRIP[name])])
     return rows
+
+
+def best_share(wanted: PackInput, method: str, seconds: float) -> tuple[float, float]:
+    """Fill, and seconds it took, of the best that a method tries with so many seconds of effort."""
+    results = []
+    start = time.process_time()
+    for attempts in METHODS[method](wanted, seconds):
+        left = seconds
+        for number, attempt in enumerate(attempts):
+            left -= attempt.seconds
+            if number and left < 0:
+                break
+            results.append(attempt.run(wanted))
+    spent = time.process_time() - start
+    return area(wanted) / (wanted.page[0] * min(used_height(wanted, result) for result in results)), spent
+
+
+def percent(share: float | None) -> str:
+    """A share to a tenth of a percent."""
+    return "–" if share is None else f"{100 * share:.1f} %"
 
 
 def sixteen_megapixels(facets: Facets) -> PackInput:
@@ -99,6 +116,117 @@ def sixteen_megapixels(facets: Facets) -> PackInput:
         facets.size * 100, facets.corner_start, corner_pixels(facets), (4096, 65536), padding=2
     )
     return replace(scaled(wanted, (16e6 / area(wanted)) ** 0.5), page=(4096, 65536))
+
+
+def on_strip(polygons: Sequence[FloatArray], width: int, megapixels: float = 0) -> PackInput:
+    """Polygons for a page of this width and any height, scaled to so many megapixels if any are given."""
+    polygons = [polygon - polygon.min(axis=0) for polygon in polygons]
+    start = np.concatenate(([0], np.cumsum([len(polygon) for polygon in polygons])))
+    size = np.array([np.ceil(polygon.max(axis=0) - 1e-6) for polygon in polygons], dtype=np.int32)
+    wanted = PackInput(size, start, np.concatenate(polygons), (width, 1 << 16), padding=2)
+    if not megapixels:
+        return wanted
+    factor = (megapixels * 1e6 / area(wanted)) ** 0.5
+    return scaled(replace(wanted, size=np.full_like(size, 1 << 16)), factor)
+
+
+def own_frames(triangles: FloatArray) -> list[FloatArray]:
+    """Triangles (n, 3, 3) laid flat with their longest edge along x."""
+    result = []
+    for corners in triangles:
+        longest = int(np.argmax(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)))
+        a, b, c = np.roll(corners, -longest, axis=0)
+        along, apex = b - a, c - a
+        length = float(np.linalg.norm(along))
+        foot = float(apex @ along) / length
+        height = float(np.linalg.norm(apex - along * foot / length))
+        result.append(np.array([[0, height], [length, height], [foot, 0]]))
+    return result
+
+
+def round_polygon(rng: np.random.Generator, radius: float) -> FloatArray:
+    """3 to 8 corners on a circle."""
+    n = int(rng.integers(3, 9))
+    angle = np.sort((np.arange(n) + rng.uniform(-0.35, 0.35, n)) * 2 * np.pi / n)
+    result: FloatArray = np.column_stack((np.cos(angle), np.sin(angle))) * radius
+    return result
+
+
+def some_polygon(rng: np.random.Generator, angular: bool) -> FloatArray:
+    """A round polygon, or an L."""
+    side = rng.uniform(350, 900)
+    if not angular:
+        return round_polygon(rng, side / 2)
+    a, b = rng.uniform(0.3, 0.6, 2)
+    return np.array([[0, 0], [1, 0], [1, a], [b, a], [b, 1], [0, 1]]) * side
+
+
+def led_panels(count: int, megapixels: float) -> PackInput:
+    """Rectangles of whole modules."""
+    sizes = np.random.default_rng(1).choice(np.arange(128, 513, 64), (count, 2))
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    return on_strip([square * size for size in sizes], 4096, megapixels)
+
+
+def some_of(name: str, count: int, width: int) -> PackInput:
+    """Some facets of a display at the density that makes all of them 16 megapixels."""
+    whole = sixteen_megapixels(loaded(name))
+    rows = np.sort(np.random.default_rng(count).choice(len(whole.size), count, replace=False))
+    polygons = np.split(whole.polygon, whole.corner_start[1:-1])
+    return on_strip([polygons[row] for row in rows], width)
+
+
+def round_polygons() -> PackInput:
+    """5,000 of radii from 20 to 90 pixels."""
+    rng = np.random.default_rng(11)
+    return on_strip([round_polygon(rng, rng.uniform(20, 90)) for _ in range(5000)], 7000)
+
+
+def mixed_polygons() -> PackInput:
+    """40, every fourth an L."""
+    rng = np.random.default_rng(3)
+    return on_strip([some_polygon(rng, angular=at % 4 == 3) for at in range(40)], 4096, 16)
+
+
+def equilateral() -> PackInput:
+    """20 triangles of 1200 pixels a side."""
+    return on_strip([np.array([[0, 3**0.5], [2, 3**0.5], [1, 0]]) * 600] * 20, 4096)
+
+
+def sphere_triangles() -> PackInput:
+    """5,120 that are nearly equilateral."""
+    return on_strip(own_frames(trimesh.creation.icosphere(subdivisions=4).triangles), 8192, 60)
+
+
+Build: TypeAlias = Callable[[], PackInput]
+
+ASIDE: dict[str, tuple[Build, bool, float | None]] = {
+    "50 LED panels, 5.45 megapixels": (lambda: led_panels(50, 5.45), False, 0.92),
+    "300 LED panels, 34.07 megapixels": (lambda: led_panels(300, 34.07), False, 0.95),
+    "5,120 triangles of a sphere, 60 megapixels": (sphere_triangles, False, 0.88),
+    "5,000 random convex polygons of 3 to 8 corners": (round_polygons, False, None),
+    "50 facets of desk816": (lambda: some_of("desk816", 50, 1400), False, 0.84),
+    "100 facets of desk816": (lambda: some_of("desk816", 100, 1600), False, 0.84),
+    "200 facets of desk816": (lambda: some_of("desk816", 200, 1842), False, 0.84),
+    "100 facets of teapot1024": (lambda: some_of("teapot1024", 100, 1600), True, None),
+    "20 equilateral triangles": (equilateral, True, 0.82),
+    "40 polygons, every fourth an L": (mixed_polygons, True, 0.8),
+}
+"""Other sets, whether the optional search is to show what it can do, and what was to be reached."""
+
+
+def aside() -> list[list[str]]:
+    """A row for every other set, on a page as wide as it says and as high as it takes."""
+    rows = [["facets", "page width", "auto", "seconds", "sparrow, 60 s", "aim"]]
+    for name, (build, few, aim) in ASIDE.items():
+        wanted = build()
+        share, seconds = best_share(wanted, "auto", 10)
+        searched = (
+            best_share(wanted, "sparrow", 60)[0] if few and importlib.util.find_spec("spyrrow") else None
+        )
+        cells = [percent(share), f"{seconds:.1f}", percent(searched), percent(aim)]
+        rows.append([name, str(wanted.page[0]), *cells])
+    return rows
 
 
 def area(wanted: PackInput) -> float:
@@ -125,9 +253,12 @@ def main() -> None:
         "own density": own_density(names),
         "canvases": canvases(names),
         "strip": strip([name for name in names if name in STRIP]),
+        "other sets": aside() if not options.names else [],
     }
     text = options.write.read_text(encoding="utf-8") if options.write else ""
     for title, rows in tables.items():
+        if not rows:
+            continue
         if not options.write:
             print(f"{title}\n\n{markdown(rows)}\n")
             continue
