@@ -20,7 +20,7 @@ from quiltcli.raster.keys import serial_of, serial_part
 from quiltcli.raster.planes import PlaneTable
 from quiltcli.raster.surfaces import has_one_normal, one_normal, surfaces
 
-_WHOLE, _PIXELS = 1024, 256  # microtiles at a time
+_WHOLE, _PIXELS = 2048, 256  # microtiles at a time
 _DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
 _SOME_DEPTH = np.int64(1) << 62
 
