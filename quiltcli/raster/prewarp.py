@@ -16,7 +16,7 @@ from quiltcli.homography import QuiltRays
 from quiltcli.raster.blocks import SIDE, Blocks
 from quiltcli.raster.planes import LATTICE, Warped, gather_corners, pixel_boxes, project
 
-_CHUNK = 1 << 13
+_CHUNK = 1 << 14
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from quiltcli.raster.planes import Planes, PlaneTable, Warped, depth_bounds
 
 SIZES = (1, 2, 3, 4, 6, 8, 12)
 LIMIT = SIZES[-1]
-_RUN = 1 << 12
-_CANDIDATES = 1 << 15
+_RUN = 1 << 15
+_CANDIDATES = 1 << 16
 _SHAPES = len(SIZES) ** 2
 _CLASS_OF = np.searchsorted(np.asarray(SIZES), np.arange(LIMIT + 1)).astype(np.uint16)
 
