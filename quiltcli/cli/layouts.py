@@ -16,7 +16,7 @@ from quiltcli.cli.options import ASPECT, PATH, SIZE
 @click.option("-o", "--output", type=PATH, required=True, help="Layout file to write.")
 @click.option(
     "--method",
-    help="auto (the best of those that follow), rows (by id, as people read), rects (bounding rectangles),"
+    help="auto (the best of rects and nest), rows (by id, as people read), rects (bounding rectangles),"
     " maxrects, nest (outlines interlock), net (neighbours stay neighbours at any angle: each facet's"
     " raster is then taken from the quilt, not from the display), or sparrow (a search of minutes for few"
     " facets, by the optional package spyrrow; its layouts differ from run to run).",

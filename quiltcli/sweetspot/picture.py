@@ -7,7 +7,6 @@ import io
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from quiltcli.errors import OutputError, Problem
 from quiltcli.geometry import FloatArray
 from quiltcli.layout.drawing import PAPER, Label, Shape
+from quiltcli.layout.svg import svg_document, svg_label, svg_points, svg_polygon
 from quiltcli.sweetspot.plan import Bitmap, Item, Lines, Plan, draw_plan
 from quiltcli.sweetspot.study import SweetSpot
 from quiltcli.wholefile import whole_file, write_text
@@ -46,15 +46,7 @@ def sweet_spot_picture(spot: SweetSpot, path: Path, measure: str = "p95") -> Non
 
 def svg_text(plan: Plan) -> str:
     """The plan as an SVG document; the map's colours are an image inside it."""
-    size = f'width="{plan.width}" height="{plan.height}"'
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {plan.width} {plan.height}"'
-        ' font-family="sans-serif">',
-        f'<rect {size} fill="{PAPER}"/>',
-        *(_svg(item) for item in plan.items),
-        "</svg>",
-    ]
-    return "\n".join(lines) + "\n"
+    return svg_document(plan.width, plan.height, PAPER, map(_svg, plan.items))
 
 
 def _svg(item: Item) -> str:
@@ -65,21 +57,14 @@ def _svg(item: Item) -> str:
         place = f'x="{item.x}" y="{item.y}" width="{width}" height="{height}"'
         return f'<image {place} href="data:image/png;base64,{data}"/>'
     if isinstance(item, Label):
-        place = f'x="{item.x:.2f}" y="{item.y:.2f}" font-size="{item.size:.1f}" fill="{item.color}"'
-        halo = f'stroke="{PAPER}" stroke-width="{_HALO}" stroke-linejoin="round" paint-order="stroke"'
-        anchor = f'text-anchor="{item.anchor}" dominant-baseline="central"'
-        return f"<text {place} {halo} {anchor}>{escape(item.text)}</text>"
+        halo = f' stroke="{PAPER}" stroke-width="{_HALO}" stroke-linejoin="round" paint-order="stroke"'
+        return svg_label(item, halo)
     if isinstance(item, Shape):
-        stroke = f' stroke="{item.outline}" stroke-width="{item.width:g}"' if item.width else ""
-        return f'<polygon points="{_points(item.points)}" fill="{item.fill}"{stroke}/>'
-    path = " ".join("M" + " L".join(_points(line).split()) for line in item.paths)
+        return svg_polygon(item)
+    path = " ".join("M" + " L".join(svg_points(line).split()) for line in item.paths)
     dash = f' stroke-dasharray="{item.dash[0]:g} {item.dash[1]:g}"' if item.dash else ""
     style = f'fill="none" stroke="{item.color}" stroke-width="{item.width:g}" stroke-linecap="round"'
     return f'<path d="{path}" {style} stroke-linejoin="round"{dash}/>'
-
-
-def _points(points: FloatArray) -> str:
-    return " ".join(f"{x:.2f},{y:.2f}" for x, y in points)
 
 
 def _png_bytes(pixels: NDArray[np.uint8]) -> bytes:
