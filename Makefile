@@ -9,7 +9,7 @@ SEEN := out/demo/pictures
 DOCS := docs/pictures
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo pictures test test-long lint types format bench packing-table golden clean
+.PHONY: help env demo pictures test test-long lint types format bench bench-docs packing-table golden clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
