@@ -34,7 +34,7 @@ from quiltcli.homography import QuiltRays, quilt_rays
 from quiltcli.raster import BlockPairs, Frame, Sight
 from quiltcli.viewer import Viewer
 
-_ROOM = 64  # pairs a triangle there is room for; memory that is not touched costs nothing
+_ROOM = 8  # pairs a triangle there is room for; memory that is not touched costs nothing
 _LEAST_ROOM = 1 << 26
 _SHARES = 4  # of a worker in what can be cut at will, so that none waits long for the last
 _MANY_PIXELS = 1 << 20

@@ -74,6 +74,35 @@ class Hits:
         result: IntArray = (self.first[:, None] + np.arange(self.run)).reshape(self.depth.shape)
         return result
 
+    def pixels(self, chosen: IntArray, first: IntArray, inside: int) -> Hits:
+        """Some of the pixels (P,), counted through all groups, each as a group of its own.
+
+        Args:
+            chosen: the pixels.
+            first: (P,) their quilt addresses.
+            inside: how many of them are not bleed.
+        """
+        group = chosen // self.depth.shape[1]
+
+        def vectors(values: NDArray[Any] | None) -> Any:
+            if values is None:
+                return None
+            index = group if values.shape[2] == 1 else chosen
+            return values.reshape(len(values), -1, 1).take(index, axis=1)
+
+        return Hits(
+            first=first,
+            run=1,
+            facet=self.facet.take(group),
+            triangle=self.triangle.take(group),
+            ray=vectors(self.ray),
+            depth=self.depth.reshape(-1, 1).take(chosen, axis=0),
+            normal=vectors(self.normal),
+            weights=vectors(self.weights),
+            position=vectors(self.position),
+            inside=inside,
+        )
+
     def put(self, buffer: NDArray[Any], values: NDArray[Any]) -> None:
         """Write values (G, k), (G, 1) for whole groups, or (1, 1) for all, into a flat buffer of any type."""
         values = values.astype(buffer.dtype, copy=False)

@@ -16,13 +16,12 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, I
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.hits import BASIS, RUN, Hits, Wanted, exact_values, vector_values
-from quiltcli.raster.keys import serial_of, serial_part
+from quiltcli.raster.keys import serial_of
 from quiltcli.raster.planes import PlaneTable
 from quiltcli.raster.surfaces import has_one_normal, one_normal, surfaces
 
 _WHOLE, _PIXELS = 2048, 256  # microtiles at a time
 _DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
-_SOME_DEPTH = np.int64(1) << 62
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ def read_canvas(
     is_even = _even(reader, serial[whole])
     for even in (True, False):
         for part in _parts(whole[is_even == even], _WHOLE):
-            yield _whole_tiles(reader, tiles.take(part), serial[part], even=even)
+            yield from _whole_tiles(reader, tiles.take(part), serial[part], even=even)
     for part in _parts(np.flatnonzero(complete), _PIXELS):
         yield _complete_tiles(reader, tiles.take(part))
     for part in _parts(np.flatnonzero(~complete & (serial < 0)), _PIXELS):
@@ -151,11 +150,7 @@ def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
     """
     canvas, bits = reader.canvas, reader.bits
     serial = canvas.filler[tiles.index] - 1
-    border = np.flatnonzero((serial >= 0) & ~tiles.interior)
-    keys = serial_part(serial[border], bits) | _SOME_DEPTH
-    canvas.keys[tiles.index[border]] = keys[:, None]
-    serial[border] = -1
-    keyed = np.flatnonzero((serial < 0) & tiles.interior)
+    keyed = np.flatnonzero(serial < 0)
     keys = canvas.keys.take(tiles.index[keyed], axis=0)
     full = np.flatnonzero(keys.min(axis=1) > 0)
     keyed, keys = keyed[full], keys[full]
@@ -163,7 +158,7 @@ def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
     serial[keyed[one]] = serial_of(keys[one, 0], bits)
     complete = np.zeros(serial.size, dtype=np.bool_)
     complete[keyed[~one]] = True
-    return serial, complete
+    return serial, complete & tiles.interior
 
 
 def _even(reader: Reader, serial: IntArray) -> BoolArray:
@@ -175,8 +170,24 @@ def _even(reader: Reader, serial: IntArray) -> BoolArray:
     return has_one_normal(reader.wanted.normals, triangle)
 
 
-def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
-    """Hits of microtiles (G,) that are filled by one pair each; `even` where each pair has one normal."""
+def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Iterator[Hits]:
+    """Hits of microtiles (n,) that are filled by one pair each; `even` where each pair has one normal.
+
+    Of microtiles at the border of a facet, only the pixels that the facet owns.
+    """
+    inner, border = np.flatnonzero(tiles.interior), np.flatnonzero(~tiles.interior)
+    if inner.size:
+        yield _filled_tiles(reader, tiles.take(inner), serial[inner], even=even)
+    if border.size:
+        some = tiles.take(border)
+        hits = _filled_tiles(reader, some, serial[border], even=even)
+        pixel, address, inside = _owned(reader, some, np.ones(hits.depth.shape, dtype=np.bool_))
+        if pixel.size:
+            yield hits.pixels(pixel, address, inside)
+
+
+def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
+    """Hits of all pixels of microtiles (G,) that are filled by one pair each."""
     planes, wanted = reader.table.planes, reader.wanted
     rows = reader.table.row_of_serial.take(serial)
     normal = None
@@ -236,18 +247,25 @@ def _complete_tiles(reader: Reader, tiles: Tiles) -> Hits:
 
 def _scattered_pixels(reader: Reader, tiles: Tiles) -> Hits:
     """Hits of those pixels of microtiles that see something and that their facet owns."""
-    block = reader.canvas.block[tiles.block]
     keys = reader.canvas.keys.take(tiles.index, axis=0)
-    drawn = keys != 0
+    pixel, address, inside = _owned(reader, tiles, keys != 0)
+    return _pixels(reader, tiles, keys.reshape(-1).take(pixel), pixel, address, inside)
+
+
+def _owned(reader: Reader, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, IntArray, int]:
+    """Those of the `drawn` pixels (n, 64) of microtiles that lie in their block and that its facet owns.
+
+    Returns:
+        the pixels, counted through all microtiles; their quilt addresses; how many are no bleed.
+    """
+    block = reader.canvas.block[tiles.block]
     drawn &= (reader.blocks.width[block] - tiles.x)[:, None] > _DX
     drawn &= (reader.blocks.height[block] - tiles.y)[:, None] > _DY
     pixel = np.flatnonzero(drawn)
     address = (tiles.lines()[:, :, None] + np.arange(8)).reshape(-1).take(pixel)
     owner = reader.owners.take(address)
     own = np.flatnonzero(np.abs(owner) == tiles.facet.take(pixel >> 6) + 1)
-    pixel = pixel.take(own)
-    inside = int(np.count_nonzero(owner.take(own) > 0))
-    return _pixels(reader, tiles, keys.reshape(-1).take(pixel), pixel, address.take(own), inside)
+    return pixel.take(own), address.take(own), int(np.count_nonzero(owner.take(own) > 0))
 
 
 def _pixels(
