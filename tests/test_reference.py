@@ -166,8 +166,8 @@ def _plain_picture(stage, who, slope, width: float, height: float):
     ("model", "pixels", "side", "eye", "look_at"),
     [
         ("cube5", 1200, "front", (0.5, 0.7, 0.9), (0, 0.15, 0)),
-        ("sphere840", 1200, "front", (0.5, 0.7, 0.9), (0, 0.15, 0)),
-        ("knot1200", 1200, "front", (0.5, 0.7, 0.9), (0, 0.15, 0)),
+        pytest.param("sphere840", 1200, "front", (0.5, 0.7, 0.9), (0, 0.15, 0), marks=pytest.mark.long),
+        pytest.param("knot1200", 1200, "front", (0.5, 0.7, 0.9), (0, 0.15, 0), marks=pytest.mark.long),
         ("cave5", 250, "back", (0.2, 1.6, 0.3), (0, 1.3, -2)),
     ],
 )
