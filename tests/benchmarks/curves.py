@@ -104,5 +104,5 @@ def _stages(stage: Stage, viewer: Viewer) -> dict[str, float]:
     """Seconds by stage in one process, the second frame's: the first finds cold memory."""
     buffers = new_buffers(stage)
     dirty = np.ones(stage.blocks.facet.size, dtype=np.bool_)
-    draw_frame(stage, viewer, buffers)
+    draw_frame(stage, viewer, buffers, dirty=dirty)
     return stage_seconds(lambda: draw_frame(stage, viewer, buffers, dirty=dirty))
