@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.binning import Pairs, bin_triangles, facet_parts
+from quiltcli.binning import Cores, Pairs, Parts, facet_parts, lit_cones, pairs_of
 from quiltcli.display import Facets, build_facets, lit_facets
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot, normalized
 from quiltcli.homography import QuiltRays, quilt_rays
@@ -14,7 +14,16 @@ from quiltcli.job import DisplayFile
 from quiltcli.layout import Layout, align, pixel_owners
 from quiltcli.meshfile import PolygonMesh
 from quiltcli.packing import pack
-from quiltcli.raster import Frame, Sight, batches, cut_blocks, rasterize, split_pairs, triangles_in_range
+from quiltcli.raster import (
+    Frame,
+    Sight,
+    batches,
+    block_keys,
+    cut_blocks,
+    pairs_by_block,
+    rasterize,
+    triangles_in_range,
+)
 from quiltcli.viewer import Viewer
 
 
@@ -90,6 +99,19 @@ def viewer(
     return Viewer(1, eye, look, cross(right, look), near, far, depth)
 
 
+def bin_triangles(
+    vertices: FloatArray,
+    triangles: Int32Array,
+    wanted: BoolArray,
+    parts: Parts,
+    lit: BoolArray,
+    eye: FloatArray,
+) -> Pairs:
+    """Both passes of binning over the `wanted` (T,) triangles; vertices are minus the eye."""
+    cones = lit_cones(parts, lit, eye)
+    return pairs_of(vertices, triangles, np.flatnonzero(wanted), Cores(cones).met_by(vertices), cones)
+
+
 @dataclass(frozen=True)
 class Picture:
     """What was rasterized: triangle (−1 none) and planar or radial depth of every quilt pixel."""
@@ -134,7 +156,8 @@ def picture(
     pairs = bin_triangles(local, triangles, wanted, facet_parts(facets, layout, bleed), rays.lit, eye.eye)
     sight = Sight(local, triangles, cut)
     blocks = cut_blocks(layout, bleed, owners)
-    frame = Frame(eye, sight, rays, blocks, split_pairs(pairs, sight, rays, blocks), owners)
+    block_pairs = pairs_by_block(block_keys(pairs, sight, rays, blocks), blocks)
+    frame = Frame(eye, sight, rays, blocks, block_pairs, owners)
     triangle = np.full(owners.size, -1, np.int64)
     depth = np.full(owners.size, np.inf)
     for batch in batches(frame):

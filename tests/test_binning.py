@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rig import CUBE, CUBE_FACES, cube, display, icosphere, panel, viewer
+from rig import CUBE, CUBE_FACES, bin_triangles, cube, display, icosphere, panel, viewer
 
-from quiltcli.binning import Cores, bin_triangles, cones, facet_parts, lit_cones
+from quiltcli.binning import Cores, cones, facet_parts, lit_cones
 from quiltcli.binning.broad import candidate_pairs, cube_faces
 from quiltcli.binning.cones import cone_planes, overlapping
 from quiltcli.binning.cores import facet_cores

@@ -16,14 +16,13 @@ import numpy as np
 from quiltcli.binning.broad import candidate_pairs
 from quiltcli.binning.cones import Cones, Parts, facet_parts, lit_cones, overlapping
 from quiltcli.binning.cores import facet_cores
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
 
 __all__ = [
     "Cones",
     "Cores",
     "Pairs",
     "Parts",
-    "bin_triangles",
     "facet_parts",
     "lit_cones",
     "pairs_of",
@@ -49,33 +48,18 @@ class Pairs:
     reaching: int
 
 
-def bin_triangles(
-    vertices: FloatArray,
-    triangles: Int32Array,
-    wanted: BoolArray,
-    parts: Parts,
-    lit: BoolArray,
-    eye: FloatArray,
+def pairs_of(
+    vertices: FloatArray, triangles: Int32Array, drawn: IntArray, core: Int32Array, cones: Cones
 ) -> Pairs:
-    """Sort the triangles to the facets on which this eye may see them.
+    """Sort triangles to the facets on which the eye may see them.
 
     Args:
         vertices: (V, 3) world minus eye, metres.
         triangles: (T, 3).
-        wanted: (T,) triangles that can be drawn at all.
-        parts: convex pieces of the facets, in the world.
-        lit: (F,) facets that are drawn.
-        eye: (3,) world metres.
+        drawn: (D,) the triangles that are asked about, indices into `triangles`.
+        core: (V,) the cores that the vertices' rays meet, by `Cores.met_by`.
+        cones: of the lit parts of the display, as this eye sees them.
     """
-    cones = lit_cones(parts, lit, eye)
-    core = Cores(cones).met_by(vertices)
-    return pairs_of(vertices, triangles, np.flatnonzero(wanted), core, cones)
-
-
-def pairs_of(
-    vertices: FloatArray, triangles: Int32Array, drawn: IntArray, core: Int32Array, cones: Cones
-) -> Pairs:
-    """As `bin_triangles`, of the triangles with the indices `drawn`, from the vertices' cores (V,)."""
     a, b, c = core.take(triangles.take(drawn, axis=0).T)
     same = (a == b) & (b == c) & (a >= 0)
     settled, rest = np.flatnonzero(same), np.flatnonzero(~same)

@@ -29,7 +29,6 @@ from quiltcli.raster.prewarp import (
     block_keys,
     block_matrices,
     pairs_by_block,
-    split_pairs,
     warp,
 )
 from quiltcli.raster.small import LIMIT, draw_small
@@ -49,7 +48,6 @@ __all__ = [
     "cut_blocks",
     "pairs_by_block",
     "rasterize",
-    "split_pairs",
     "triangles_in_range",
 ]
 

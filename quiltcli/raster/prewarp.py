@@ -62,13 +62,12 @@ def block_matrices(
     return matrix
 
 
-def split_pairs(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> BlockPairs:
-    """Give every pair to the blocks of its facet that the triangle's bounding box touches."""
-    return pairs_by_block(block_keys(pairs, sight, rays, blocks), blocks)
-
-
 def block_keys(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> IntArray:
-    """As `split_pairs`, as numbers block·2³² + triangle, ascending."""
+    """Give every pair to the blocks of its facet that the triangle's bounding box touches.
+
+    Returns:
+        (N,) block pairs as numbers block·2³² + triangle, ascending.
+    """
     per_facet = np.diff(blocks.start)
     single = per_facet[pairs.facet] == 1
     block = [blocks.start[pairs.facet[single]]]
