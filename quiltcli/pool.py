@@ -224,8 +224,6 @@ class Pool:
             for (share, count), part in zip(shares, parts, strict=True)
         ]
         binned = join(self._stage.scene, self._stage.blocks, seen, found)
-        if binned.pairs.triangle.size > arena.triangle.size:
-            return binned
         arena.start[:] = binned.pairs.start
         arena.triangle[: binned.pairs.triangle.size] = binned.pairs.triangle
         return replace(binned, pairs=arena.pairs())

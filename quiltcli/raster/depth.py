@@ -8,6 +8,7 @@ near/t ≤ L ≤ far/t: nothing is divided, and triangles wholly inside the rang
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class DepthRange:
     look: FloatArray
     rays: FloatArray
 
-    @property
+    @cached_property
     def handed(self) -> FloatArray:
         """Sign (K,) of the determinant of every block's matrix, which tells mirrored blocks from others."""
         u, v, o = self.rays.transpose(2, 0, 1)

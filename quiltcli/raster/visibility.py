@@ -66,7 +66,7 @@ class Tiles:
 
 @dataclass(frozen=True)
 class Reader:
-    """What is needed to read a canvas; `read_canvas` says what its attributes are, `surfaces` the last."""
+    """What is needed to read a canvas; `read_canvas` says what its attributes are."""
 
     canvas: Canvas
     table: PlaneTable
@@ -75,7 +75,6 @@ class Reader:
     owners: OwnerArray
     bits: int
     wanted: Wanted
-    handed: FloatArray
 
 
 def read_canvas(
@@ -101,7 +100,7 @@ def read_canvas(
     tiles = _drawn_tiles(canvas, blocks)
     if not tiles.index.size:
         return
-    reader = Reader(canvas, table, blocks, limits, owners, bits, wanted, limits.handed)
+    reader = Reader(canvas, table, blocks, limits, owners, bits, wanted)
     serial, complete = _sort_out(reader, tiles)
     whole = np.flatnonzero(serial >= 0)
     is_even = _even(reader, serial[whole])
@@ -192,9 +191,9 @@ def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool)
     rows = reader.table.row_of_serial.take(serial)
     normal = None
     if even and wanted.normals is not None:
-        normal = one_normal(wanted.normals, planes, rows, reader.handed)
+        normal = one_normal(wanted.normals, planes, rows, reader.limits.handed)
         wanted = replace(wanted, normals=None)
-    seen = surfaces(planes, rows, wanted, reader.handed)
+    seen = surfaces(planes, rows, wanted, reader.limits.handed)
     if wanted.normals is not None:
         normal = vector_values(tiles.local(seen.normal))
     inverse = exact_values(tiles.local(seen.inverse))
@@ -285,7 +284,7 @@ def _pixels(
         pixel = np.arange(keys.size)
     table = reader.table
     serial, which = _distinct(serial_of(keys, reader.bits), table.row_of_serial.size)
-    seen = surfaces(table.planes, table.row_of_serial.take(serial), reader.wanted, reader.handed)
+    seen = surfaces(table.planes, table.row_of_serial.take(serial), reader.wanted, reader.limits.handed)
     numbers = seen.numbers.take(which, axis=0)
     x = (tiles.x[:, None] + _DX).reshape(-1).take(pixel).astype(np.float64)
     y = (tiles.y[:, None] + _DY).reshape(-1).take(pixel).astype(np.float64)
