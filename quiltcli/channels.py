@@ -48,8 +48,8 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
 
 
 def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Sequence[Values]:
-    rgb = shade(scene, viewer.eye, hits)
-    return *half_floats(np.minimum(rgb, MOST_HALF, out=rgb)), np.ones((1, 1), dtype=np.float16)
+    colors = [half_floats(np.minimum(color, MOST_HALF)) for color in shade(scene, viewer.eye, hits)]
+    return *colors, np.ones((1, 1), dtype=np.float16)
 
 
 def _depth(scene: Scene, viewer: Viewer, hits: Hits) -> Values:

@@ -307,7 +307,8 @@ def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Bu
     for sample in sample_places(samples):
         for hits in rasterize(frame, batch, sample, shading_wants(stage.scene)):
             rgba = np.ones((4, hits.depth.size), dtype=np.float32)
-            np.minimum(shade(stage.scene, frame.viewer.eye, hits).reshape(3, -1), MOST_HALF, out=rgba[:3])
+            for color, mine in zip(shade(stage.scene, frame.viewer.eye, hits), rgba, strict=False):
+                np.minimum(color, MOST_HALF, out=mine.reshape(hits.depth.shape))
             found.append((hits.pixel.ravel(), rgba))
     if not found or "rgba" not in stage.job.output.channels:
         return

@@ -1,8 +1,9 @@
 """Shading: the light that leaves each visible point towards the eye.
 
-Surfaces reflect as a Lambert base under a GGX layer. Nothing casts a shadow and light is not passed on
-from surface to surface. Every sum is written out in a fixed order of single-precision operations, so a
-pixel's value depends neither on the machine nor on which other pixels are shaded with it.
+Surfaces reflect as a Lambert base under a GGX layer, matte ones (`specular: 0`) as the base alone.
+Nothing casts a shadow and light is not passed on from surface to surface. Every sum is written out in a
+fixed order of single-precision operations, so a pixel's value depends neither on the machine nor on
+which other pixels are shaded with it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array
 from quiltcli.raster.hits import Hits, Wanted
+from quiltcli.raster.vectors import PointVectors, Vectors, along, products, vector_values
 from quiltcli.scene import Scene
 
 # Irradiance of the light at the eye; a white surface that faces it comes out near 1.
@@ -34,6 +36,33 @@ Values: TypeAlias = "Float32Array | np.float32"
 
 
 @dataclass(frozen=True)
+class _Layer:
+    """The GGX layer of n groups of k visible points, and what of it depends on the eye alone.
+
+    What a material says is (n, 1), or a number where all points agree.
+
+    Attributes:
+        specular0: 3 values, what it reflects at normal incidence.
+        specular90: what it reflects at grazing incidence, 0 where there is none.
+        coat: how much of the base it covers, 0 where there is none.
+        alpha2: the square of GGX's alpha.
+        nv: (n, k) cosine between normal and eye; below 0 where interpolation turns a normal away.
+        front: (n, k) the same where the eye is in front, almost 0 elsewhere.
+        root: (n, k) root of `masking_root` of the eye.
+        leaving: (n, k) share of the base's light that the layer lets out to the eye.
+    """
+
+    specular0: tuple[Values, ...]
+    specular90: Values
+    coat: Values
+    alpha2: Values
+    nv: Float32Array
+    front: Float32Array
+    root: Float32Array
+    leaving: Float32Array
+
+
+@dataclass(frozen=True)
 class _Points:
     """Visible points in n groups of k, like the hits they come from.
 
@@ -41,30 +70,24 @@ class _Points:
     Vectors are not of unit length: their products are divided by their lengths, which takes less time.
 
     Attributes:
-        normal: (3, n, k) shading normals on the side of the eye; (3, n, 1) where flat.
+        normal: shading normals on the side of the eye.
         normal_scale: (n, k) or (n, 1) one over their lengths.
-        ray: (3, n, k) directions from the eye.
+        ray: directions from the eye.
         ray_scale: (n, k) one over their lengths, negative: towards the eye.
-        nv: (n, k) cosine between normal and eye; below 0 where interpolation turns a normal away.
         base: 3 values, base colour.
         steady: 3 values, light that needs no lamp: ambient and emission, or the colour of an unlit surface.
         diffuse: share of light for the Lambert base, over π.
-        specular0: 3 values, what the layer reflects at normal incidence.
-        specular90: what it reflects at grazing incidence, 0 on an unlit surface.
-        alpha2: the square of GGX's alpha.
+        layer: what lies on the base; None where all points are matte.
     """
 
-    normal: Float32Array
+    normal: Vectors
     normal_scale: Float32Array
-    ray: Float32Array
+    ray: Vectors
     ray_scale: Float32Array
-    nv: Float32Array
     base: tuple[Values, ...]
     steady: tuple[Values, ...]
     diffuse: Values
-    specular0: tuple[Values, ...]
-    specular90: Values
-    alpha2: Values
+    layer: _Layer | None
 
 
 def shading_wants(scene: Scene) -> Wanted:
@@ -76,48 +99,77 @@ def shading_wants(scene: Scene) -> Wanted:
     )
 
 
-def shade(scene: Scene, eye: FloatArray, hits: Hits) -> Float32Array:
-    """Linear RGB (3, G, k) float32 of every hit.
+def shade(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]:
+    """Linear red, green and blue of every hit, (G, k) float32 each, or (G, 1) where groups have one colour.
 
     Args:
         scene: the scene.
         eye: (3,) world metres.
         hits: G groups of k visible points, with what `shading_wants` asks for.
     """
-    return _radiance(scene, eye, hits, _points(scene, hits))
+    points = _points(scene, hits)
+    lights = scene.lights
+    total: list[Values] = list(points.steady)
+    for direction, color in zip(lights.directional_direction, lights.directional_color, strict=True):
+        nl = along(points.normal, -direction)
+        _add_light(total, points, nl, along(points.ray, -direction) if points.layer else None, color)
+    for place, color in zip(lights.point_position, lights.point_color, strict=True):
+        assert hits.position is not None
+        offset = (place - eye).astype(np.float32)[:, None, None] - hits.position.astype(np.float32)
+        towards = PointVectors(offset)
+        nearness = np.reciprocal(np.maximum(products(towards, towards), _LEAST_DISTANCE2))
+        offset *= np.sqrt(nearness)
+        nl, rl = products(points.normal, towards), products(points.ray, towards)
+        _add_light(total, points, nl, rl, color, nearness)
+    if lights.headlight:
+        nl = products(points.normal, points.ray)
+        nl *= points.ray_scale
+        _add_light(total, points, nl, np.reciprocal(points.ray_scale), np.full(3, HEADLIGHT, np.float32))
+    groups = (hits.triangle.size, 1)
+    return tuple(np.full(groups, v) if isinstance(v, np.float32) else v for v in total)
 
 
 def shading_normals(hits: Hits) -> Float32Array:
     """Unit normals (3, G, k) float32 as shading uses them: interpolated, on the side of the eye."""
     assert hits.normal is not None
-    return np.multiply(hits.normal, _over_length(hits.normal))
+    return np.multiply(vector_values(hits.normal), _over_length(hits.normal))
 
 
 def _points(scene: Scene, hits: Hits) -> _Points:
     assert hits.normal is not None
-    rows = _materials_at(_material_table(scene), scene.material.take(hits.triangle))
+    rows = _materials_of(scene, hits.triangle)
     base, ambient, emission = rows[0:3], rows[3:6], rows[6:9]
-    diffuse, metallic, dielectric, specular90, alpha2 = rows[9:14]
+    diffuse, metallic, dielectric, specular90, coat, alpha2 = rows[9:15]
     if scene.corner_colors is not None:
         color = _colors(scene.corner_colors, hits)
         base = tuple(v * c for v, c in zip(base, color, strict=True))
         ambient = tuple(v * c for v, c in zip(ambient, color, strict=True))
     normal_scale, ray_scale = _over_length(hits.normal), _over_length(hits.ray, -_ONE)
-    nv = _dot(hits.normal, hits.ray)
-    nv *= normal_scale
-    nv *= ray_scale
+    layer = None
+    if np.any(specular90):
+        nv = products(hits.normal, hits.ray)
+        nv *= normal_scale
+        nv *= ray_scale
+        front = np.maximum(nv, _LEAST_COSINE)
+        layer = _Layer(
+            specular0=_reflected(dielectric, metallic, base),
+            specular90=specular90,
+            coat=coat,
+            alpha2=alpha2,
+            nv=nv,
+            front=front,
+            root=_masking_root(front, alpha2),
+            leaving=_let_through(front, coat),
+        )
     return _Points(
         normal=hits.normal,
         normal_scale=normal_scale,
         ray=hits.ray,
         ray_scale=ray_scale,
-        nv=nv,
         base=base,
         steady=tuple(a + e for a, e in zip(ambient, emission, strict=True)),
         diffuse=diffuse,
-        specular0=_reflected(dielectric, metallic, base),
-        specular90=specular90,
-        alpha2=alpha2,
+        layer=layer,
     )
 
 
@@ -128,9 +180,9 @@ def _reflected(dielectric: Values, metallic: Values, base: tuple[Values, ...]) -
     return tuple(dielectric + metallic * v for v in base)
 
 
-def _over_length(vectors: Float32Array, sign: np.float32 = _ONE) -> Float32Array:
-    """`sign` over the lengths (…) of vectors along the first axis."""
-    length2 = _dot(vectors, vectors)
+def _over_length(vectors: Vectors, sign: np.float32 = _ONE) -> Float32Array:
+    """`sign` over the lengths (…) of vectors."""
+    length2 = products(vectors, vectors)
     length2 += _LEAST_LENGTH2
     result: Float32Array = np.divide(sign, np.sqrt(length2, out=length2), out=length2)
     return result
@@ -146,112 +198,105 @@ def _colors(table: Float32Array, hits: Hits) -> Float32Array:
     return value
 
 
-def _radiance(scene: Scene, eye: FloatArray, hits: Hits, points: _Points) -> Float32Array:
-    """Light (3, n, k) towards the eye from all lamps and from none."""
-    lights = scene.lights
-    result = np.empty(points.ray.shape, dtype=np.float32)
-    for k in range(3):
-        result[k] = points.steady[k]
-    for direction, color in zip(lights.directional_direction, lights.directional_color, strict=True):
-        _add_light(result, points, -direction, color)
-    for place, color in zip(lights.point_position, lights.point_color, strict=True):
-        assert hits.position is not None
-        offset = (place - eye).astype(np.float32)[:, None, None] - hits.position.astype(np.float32)
-        nearness = np.reciprocal(np.maximum(_dot(offset, offset), _LEAST_DISTANCE2))
-        offset *= np.sqrt(nearness)
-        _add_light(result, points, offset, color, nearness)
-    if lights.headlight:
-        eyeward = points.ray * points.ray_scale
-        _add_light(result, points, eyeward, np.full(3, HEADLIGHT, np.float32))
-    return result
-
-
 def _add_light(
-    result: Float32Array,
+    total: list[Values],
     points: _Points,
-    light: Float32Array,
+    nl: Float32Array,
+    rl: Float32Array | None,
     color: Float32Array,
     falloff: Float32Array | None = None,
 ) -> None:
     """Add what one lamp sends to the eye by way of each point.
 
-    GGX with Smith's height-correlated shadowing (Heitz 2014, equation 99) and Schlick's Fresnel term
-    (1994); the half vector is needed only through its products with the others. The base gets the light that
-    the layer lets in and out again, so no surface returns more than it receives.
+    The base gets the light that the layer lets in and out again, so no surface returns more than it
+    receives.
 
     Args:
-        result: (3, n, k), added to.
+        total: red, green and blue, added to.
         points: the points.
-        light: (3, n, k) unit directions to the lamp, or (3,) for all.
+        nl: (n, k) or (n, 1) products of normals and unit directions to the lamp; used up.
+        rl: (n, k) products of rays and unit directions to the lamp; used up. A layer needs them.
         color: (3,) irradiance on a surface that faces the lamp.
         falloff: (n, k) factor of `color`.
     """
-    nl = _dot(points.normal, light) * points.normal_scale
+    nl *= points.normal_scale
     np.maximum(nl, np.float32(0), out=nl)
-    vl = _dot(points.ray, light)
-    vl *= points.ray_scale
+    received = nl if falloff is None else nl * falloff
+    layer = points.layer
+    glints: tuple[Float32Array | None, ...] = (None, None, None)
+    base = received
+    if layer is not None:
+        assert rl is not None
+        rl *= points.ray_scale
+        glints = _glints(layer, nl, rl, received, color)
+        base = layer.leaving * (_let_through(nl, layer.coat) * received)
+    for k, glint in enumerate(glints):
+        part = base * (color[k] * points.base[k] * points.diffuse)
+        if glint is not None:
+            part += glint
+        total[k] = np.add(part, total[k], out=part if part.size >= np.size(total[k]) else None)
+
+
+def _glints(
+    layer: _Layer, nl: Float32Array, vl: Float32Array, received: Float32Array, color: Float32Array
+) -> tuple[Float32Array, ...]:
+    """Red, green and blue (n, k) that a layer reflects.
+
+    GGX with Smith's height-correlated shadowing (Heitz 2014, equation 99) and Schlick's Fresnel term
+    (1994); the half vector is needed only through its products with the others.
+
+    Args:
+        layer: the layer.
+        nl: (n, k) or (n, 1) cosine between normal and lamp, 0 where it is behind.
+        vl: (n, k) cosine between eye and lamp; used up.
+        received: (n, k) or (n, 1) share of the lamp's irradiance.
+        color: (3,) the irradiance.
+    """
+    a2 = layer.alpha2
     vl += _ONE
     half_angle = np.maximum(vl, _LEAST_COSINE, out=vl)  # 1 + v·l, which is 2 (v·h)²
     # From the cosines as they are: a normal that is bent past the silhouette must not pretend to face
     # the half vector, or light from behind would glint along every outline.
-    nh2 = nl + points.nv  # from here on twice (n·h)²
-    np.maximum(nh2, np.float32(0), out=nh2)
-    nh2 *= nh2
-    nh2 /= half_angle
-    np.minimum(nh2, np.float32(2), out=nh2)
-    a2 = points.alpha2
-    rest = _ONE - a2
-    spread = np.multiply(nh2, rest * _HALF, out=nh2)
-    np.subtract(_ONE, spread, out=spread)
-    nv = np.maximum(points.nv, _LEAST_COSINE)
-    received = nl if falloff is None else nl * falloff
+    spread = layer.nv + nl  # twice (n·h)² after the next four lines
+    np.maximum(spread, np.float32(0), out=spread)
     spread *= spread
-    spread *= _shadowing(nl, nv, a2, rest) + _shadowing(nv, nl, a2, rest)
+    spread /= half_angle
+    np.minimum(spread, np.float32(2), out=spread)
+    spread *= (a2 - _ONE) * _HALF
+    spread += _ONE
+    spread *= spread
+    masking = layer.root * nl
+    masking += layer.front * _masking_root(nl, a2)
+    spread *= masking
     specular = np.divide(received * (a2 * np.float32(0.5 / math.pi)), spread, out=spread)
     cosine = np.sqrt(half_angle, out=half_angle)
     cosine *= np.float32(math.sqrt(0.5))
     rim = _fifth(cosine)
     rim *= specular
     specular -= rim
-    away = _fifth(nv)
-    away -= _ONE
-    base = away * ((_fifth(nl) - _ONE) * received)
-    _add_parts(result, points, color, base, specular, rim * points.specular90)
+    rim *= layer.specular90
+    if color[0] == color[1] == color[2] and layer.specular0[0] is layer.specular0[1]:
+        specular *= layer.specular0[0]
+        specular += rim
+        specular *= color[0]
+        return specular, specular, specular
+    return tuple((layer.specular0[k] * specular + rim) * color[k] for k in range(3))
 
 
-def _add_parts(
-    result: Float32Array,
-    points: _Points,
-    color: Float32Array,
-    base: Float32Array,
-    specular: Float32Array,
-    rim: Float32Array,
-) -> None:
-    """Add the parts of a lamp's light: what takes the surface's colour, what the layer reflects, the rim."""
-
-    def layer(k: int) -> Float32Array:
-        light: Float32Array = (color[k] * points.specular0[k]) * specular
-        light += color[k] * rim
-        return light
-
-    same = color[0] == color[1] == color[2] and points.specular0[0] is points.specular0[1]
-    shared = layer(0) if same else None
-    for k in range(3):
-        result[k] += layer(k) if shared is None else shared
-        result[k] += (color[k] * points.base[k] * points.diffuse) * base
-
-
-def _shadowing(one: Float32Array, other: Float32Array, a2: Values, rest: Values) -> Float32Array:
-    """The first cosine times √(a² + (1 − a²)·other²), a term of Smith's masking and shadowing."""
-    root = other * other * rest
-    root += a2
-    result: Float32Array = one * np.sqrt(root, out=root)
+def _masking_root(cosine: Float32Array, alpha2: Values) -> Float32Array:
+    """√(α² + (1 − α²)·cosine²), of Smith's masking and shadowing."""
+    root = cosine * cosine
+    root *= _ONE - alpha2
+    root += alpha2
+    result: Float32Array = np.sqrt(root, out=root)
     return result
 
 
-def _dot(a: Float32Array, b: Float32Array) -> Float32Array:
-    """Dot products along the first axis of (3, …) arrays or a (3,), summed in the order x, y, z."""
-    result: Float32Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _let_through(cosine: Float32Array, coat: Values) -> Float32Array:
+    """What a layer lets through at an angle: 1 less the rise of its reflection towards the rim."""
+    result = _fifth(cosine)
+    result *= -coat
+    result += _ONE
     return result
 
 
@@ -266,26 +311,30 @@ def _fifth(cosine: Float32Array) -> Float32Array:
 
 @lru_cache(maxsize=1)
 def _material_table(scene: Scene) -> Float32Array:
-    """The materials as the lamp loop wants them (M, 14): the values of `_Points`, in its order."""
+    """The materials as the lamp loop wants them (M, 15), in the order in which `_points` takes them."""
     materials, ambient = scene.materials, scene.lights.ambient
     lit = (~materials.unlit).astype(np.float32)
     alpha = np.maximum(materials.roughness, np.float32(LEAST_ROUGHNESS)) ** 2
-    table = np.empty((len(lit), 14), dtype=np.float32)
+    paint, coat = lit * (1 - materials.metallic), np.float32(_DIELECTRIC) * materials.specular
+    table = np.empty((len(lit), 15), dtype=np.float32)
     table[:, 0:3] = materials.color * lit[:, None]
     table[:, 3:6] = materials.color * np.where(materials.unlit[:, None], np.float32(1), ambient)
     table[:, 6:9] = materials.emission * lit[:, None]
-    table[:, 9] = lit * (1 - materials.metallic) * np.float32((1 - _DIELECTRIC) / math.pi)
+    table[:, 9] = paint * (1 - coat) / np.float32(math.pi)
     table[:, 10] = lit * materials.metallic
-    table[:, 11] = lit * (1 - materials.metallic) * np.float32(_DIELECTRIC)
-    table[:, 12] = lit
-    table[:, 13] = np.where(materials.unlit, np.float32(1), alpha * alpha)
+    table[:, 11] = paint * coat
+    table[:, 12] = lit * materials.metallic + paint * materials.specular
+    table[:, 13] = materials.specular
+    table[:, 14] = np.where(materials.unlit, np.float32(1), alpha * alpha)
     return table
 
 
-def _materials_at(table: Float32Array, material: Int32Array) -> tuple[Values, ...]:
+def _materials_of(scene: Scene, triangle: Int32Array) -> tuple[Values, ...]:
     """The columns of the table at each group, as plain numbers where one material has all groups."""
+    table = _material_table(scene)
     if len(table) == 1:
         return tuple(table[0])
+    material = scene.material.take(triangle)
     if bool((material == material[0]).all()):
         return tuple(table[material[0]])
     return tuple(np.ascontiguousarray(table.take(material, axis=0).T)[:, :, None])

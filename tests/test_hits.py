@@ -7,7 +7,17 @@ import pytest
 from wallscene import hits
 
 from quiltcli.channels import half_floats
-from quiltcli.raster.hits import BASIS, RUN, Hits, exact_values, vector_values
+from quiltcli.raster.hits import RUN, Hits
+from quiltcli.raster.vectors import (
+    BASIS,
+    PointVectors,
+    TileVectors,
+    along,
+    exact_values,
+    products,
+    single_values,
+    vector_values,
+)
 
 
 def planes(count, seed=4):
@@ -30,31 +40,56 @@ def test_values_do_not_depend_on_the_order_of_sums_nor_on_the_company():
     whole = exact_values(plane)
     for part in (slice(0, 1), slice(5, 18), slice(40, 97)):
         np.testing.assert_array_equal(exact_values(plane[:, part].copy()), whole[part])
-    vectors = np.stack((plane, plane[::-1], plane * 0.3))
-    whole = vector_values(vectors)
-    for part in (slice(0, 1), slice(5, 18), slice(40, 97)):
-        np.testing.assert_array_equal(vector_values(vectors[:, :, part].copy()), whole[:, part])
+    for form in (plane, quadratics(97)):
+        whole = single_values(form)
+        for part in (slice(0, 1), slice(5, 18), slice(40, 97)):
+            np.testing.assert_array_equal(single_values(form[:, part].copy()), whole[part])
     # In float32, every partial sum of the rounded planes is a float32: adding backwards changes nothing.
-    first = whole[:, :, 0]
-    steps = whole[:, :, 1] - first, whole[:, :, 8] - first
-    backwards = (steps[1][:, :, None] * BASIS[1].astype(np.float32)) + (
-        steps[0][:, :, None] * BASIS[0].astype(np.float32) + first[:, :, None]
+    whole = single_values(plane)
+    first = whole[:, 0]
+    steps = whole[:, 1] - first, whole[:, 8] - first
+    backwards = (steps[1][:, None] * BASIS[1].astype(np.float32)) + (
+        steps[0][:, None] * BASIS[0].astype(np.float32) + first[:, None]
     )
     np.testing.assert_array_equal(backwards, whole)
 
 
-def test_vectors_keep_their_direction():
-    rng = np.random.default_rng(8)
-    vectors = rng.normal(size=(3, 3, 300)) * 10.0 ** rng.integers(-12, 12, 300)
-    vectors[:, :2] *= 0.02
-    exact = np.einsum("cin,ip->cnp", vectors, BASIS)
-    got = vector_values(vectors).astype(np.float64)
-    greatest = np.abs(got).max(axis=(0, 2))
-    assert 0.2 < greatest.min() <= greatest.max() < 8
-    # The scale is a power of two, one for each vector; coefficients are rounded to 2⁻²¹ of it.
-    scale = 2.0 ** np.rint(np.log2(np.abs(exact).max(axis=(0, 2)) / greatest))
-    error = np.abs(got * scale[:, None] - exact)
-    assert (error <= (7 + 7 + 1) * 2.0**-22 * scale[:, None] * (1 + 1e-9)).all()
+def quadratics(count, seed=6):
+    """Forms (6, count) as products of rays and normals have them: both vary little over a microtile."""
+    a, b = (tile_vectors(count, seed + k).planes for k in (0, 1))
+    return np.stack(
+        (
+            (a[:, 0] * b[:, 0]).sum(axis=0),
+            (a[:, 0] * b[:, 1] + a[:, 1] * b[:, 0]).sum(axis=0),
+            (a[:, 1] * b[:, 1]).sum(axis=0),
+            (a[:, 0] * b[:, 2] + a[:, 2] * b[:, 0]).sum(axis=0),
+            (a[:, 1] * b[:, 2] + a[:, 2] * b[:, 1]).sum(axis=0),
+            (a[:, 2] * b[:, 2]).sum(axis=0),
+        )
+    )
+
+
+def tile_vectors(count, seed):
+    rng = np.random.default_rng(seed)
+    planes = rng.normal(size=(3, 3, count))
+    planes[:, :2] *= 0.02
+    return TileVectors(planes)
+
+
+def test_vectors_over_a_microtile_and_their_products_are_those_of_the_planes():
+    normals, rays = tile_vectors(300, 8), tile_vectors(300, 9)
+    direction = np.float32([0.2, -0.7, 0.4])
+    ones = PointVectors(np.random.default_rng(1).normal(size=(3, 300, 1)).astype(np.float32))
+    n, r = (np.einsum("cin,ip->cnp", one.planes, BASIS) for one in (normals, rays))
+    # Forms are rounded to 2⁻²¹ or 2⁻²⁰ of the greatest of their terms, which these vectors' sums bound.
+    bound = 15 * 2.0**-20 * 8
+    np.testing.assert_allclose(vector_values(normals), n, atol=bound)
+    np.testing.assert_allclose(along(normals, direction), np.einsum("cnp,c->np", n, direction), atol=bound)
+    np.testing.assert_allclose(products(normals, rays), (n * r).sum(axis=0), atol=4 * bound)
+    np.testing.assert_allclose(products(rays, rays), (r * r).sum(axis=0), atol=4 * bound)
+    np.testing.assert_allclose(products(ones, rays), (ones.values * r).sum(axis=0), atol=4 * bound)
+    single = PointVectors(vector_values(normals))
+    np.testing.assert_allclose(products(single, rays), (n * r).sum(axis=0), atol=4 * bound)
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.uint32])

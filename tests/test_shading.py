@@ -15,7 +15,7 @@ from quiltcli.scene import Materials
 
 
 def shade(scene, eye, seen):
-    return shading.shade(scene, eye, on(scene, seen)).reshape(3, -1)
+    return np.stack([color.ravel() for color in shading.shade(scene, eye, on(scene, seen))])
 
 
 def shading_normals(scene, seen):
@@ -104,6 +104,44 @@ def test_unlit_is_exactly_its_color():
         color=color, unlit=True, emission=(5, 5, 5),
     )  # fmt: skip
     np.testing.assert_array_equal(shade(scene, EYE, STRAIGHT)[:, 0], color)
+
+
+def test_matte_surfaces_follow_lambert_alone():
+    """No layer: colour over π times the cosine, whatever the roughness and from wherever one looks."""
+    sun = normalized(np.array([0.3, -0.5, -1.0]))
+    places = np.random.default_rng(4).normal(size=(3, 50))
+    places[2] = -np.abs(places[2]) - 0.1
+    for roughness in (0.1, 1.0):
+        scene = wall(lights([sun], [[3, 2, 1]]), color=(0.5, 0.25, 1), roughness=roughness, specular=0.0)
+        expected = np.array([1.5, 0.5, 1]) / math.pi * -sun[2]
+        got = shade(scene, EYE, hits(places))
+        np.testing.assert_allclose(got, np.repeat(expected[:, None], got.shape[1], axis=1), rtol=1e-6)
+    lamp = wall(lights(point=[[0, 1, 1]], power=[[4, 4, 4]]), color=(1, 1, 1), specular=0.0)
+    expected = 4 / 2 * math.sqrt(0.5) / math.pi
+    assert shade(lamp, EYE, STRAIGHT)[:, 0] == pytest.approx([expected] * 3, rel=1e-6)
+
+
+def test_metal_reflects_though_it_is_called_matte():
+    sun = lights([[0.2, 0, -1]], [[3, 3, 3]])
+    glossy, matte = (shade(wall(sun, metallic=1.0, specular=s), EYE, STRAIGHT) for s in (1.0, 0.0))
+    np.testing.assert_array_equal(glossy, matte)
+
+
+def test_matte_and_glossy_points_do_not_change_each_other():
+    scene = wall(lights([[0.1, -0.4, -1]], [[3, 3, 3]]))
+    two = Materials(
+        *(np.concatenate(pair) for pair in zip(vars(materials(specular=0.0)).values(),
+          vars(materials()).values(), strict=True))
+    )  # fmt: skip
+    scene = replace(
+        scene, triangles=np.repeat(scene.triangles, 2, 0), flat=np.zeros(2, bool),
+        material=np.array([0, 1], np.int32), materials=two,
+    )  # fmt: skip
+    position = np.tile([[0.1], [0.2], [-2]], 2)
+    both = shade(scene, EYE, hits(position, triangle=[0, 1], scene=scene))
+    for k in (0, 1):
+        alone = shade(scene, EYE, hits(position[:, k : k + 1], triangle=[k], scene=scene))
+        np.testing.assert_array_equal(np.broadcast_to(alone, (3, 1))[:, 0], both[:, k])
 
 
 def test_vertex_colors_multiply_the_base():

@@ -17,13 +17,14 @@ def lights(sun=(), color=(), point=(), power=(), ambient=(0, 0, 0), headlight=Fa
     return Lights(rows(sun), rows(color), rows(point), rows(power), np.array(ambient, np.float32), headlight)
 
 
-def materials(color=(1, 1, 1), metallic=0.0, roughness=0.5, emission=(0, 0, 0), unlit=False):
+def materials(color=(1, 1, 1), metallic=0.0, roughness=0.5, emission=(0, 0, 0), unlit=False, specular=1.0):
     return Materials(
         np.array([color], np.float32),
         np.array([metallic], np.float32),
         np.array([roughness], np.float32),
         np.array([emission], np.float32),
         np.array([unlit]),
+        np.array([specular], np.float32),
     )
 
 

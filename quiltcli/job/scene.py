@@ -37,6 +37,8 @@ class MaterialSpec(Model):
     """Light given off, linear."""
     unlit: bool | None = None
     """Show exactly `color`, whatever the lights."""
+    specular: Unit | None = None
+    """1 for a surface that also reflects the lamps themselves, 0 for a matte one; metals always do."""
 
 
 class ObjectSpec(Model):

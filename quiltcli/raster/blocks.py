@@ -205,6 +205,14 @@ def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
     )
 
 
+def least_keys(canvas: Canvas) -> IntArray:
+    """The least key (M,) of every microtile, looked for where there are any."""
+    least = np.zeros(canvas.touched.size, dtype=np.int64)
+    touched = np.flatnonzero(canvas.touched)
+    least[touched] = canvas.keys.take(touched, axis=0).min(axis=1)
+    return least
+
+
 def ray_matrices(
     eye_from_quilt: FloatArray, blocks: Blocks, block: IntArray, sample: tuple[float, float]
 ) -> FloatArray:

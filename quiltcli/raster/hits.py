@@ -1,4 +1,4 @@
-"""What the visible pixels see, and planes evaluated over the pixels of microtiles."""
+"""What the visible pixels see, and its way into the quilt's buffers."""
 
 from __future__ import annotations
 
@@ -9,16 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
-from quiltcli.raster.planes import power_of_two
-
-BASIS: FloatArray = np.stack((np.tile(np.arange(8.0), 8), np.repeat(np.arange(8.0), 8), np.ones(64)))
-"""Column, row and 1 (3, 64) of the pixels of a microtile, whose 64 pixels are neighbours in memory."""
+from quiltcli.raster.vectors import PointVectors, Vectors, vector_values
 
 RUN = 8
 """Pixels of a microtile that are neighbours in the quilt."""
-
-_BASIS32: Float32Array = BASIS.astype(np.float32)
-_ROUND_TO = 6.0  # numbers below 2 that are added to it keep 2⁻²¹ in single precision, 2⁻⁵⁰ in double
 
 
 @dataclass(frozen=True)
@@ -48,10 +42,9 @@ class Hits:
         run: 1, or RUN.
         facet: (G,) facet index.
         triangle: (G,) triangle index.
-        ray: (3, G, k) direction from the eye to the point that is seen, world axes, of any length.
+        ray: directions from the eye to the points that are seen, world axes, of any length.
         depth: (G, k) the point's depth as the viewer measures it, metres.
-        normal: (3, G, k) interpolated normal on the side of the eye, of any length, or (3, G, 1) where
-            each group has one; None unless wanted.
+        normal: interpolated normals on the side of the eye, of any length; None unless wanted.
         weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
         position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
         inside: how many of the pixels lie in their facet's polygon, not in its bleed.
@@ -61,9 +54,9 @@ class Hits:
     run: int
     facet: Int32Array
     triangle: Int32Array
-    ray: Float32Array
+    ray: Vectors
     depth: FloatArray
-    normal: Float32Array | None
+    normal: Vectors | None
     weights: Float32Array | None
     position: FloatArray | None
     inside: int
@@ -95,9 +88,9 @@ class Hits:
             run=1,
             facet=self.facet.take(group),
             triangle=self.triangle.take(group),
-            ray=vectors(self.ray),
+            ray=PointVectors(vectors(vector_values(self.ray))),
             depth=self.depth.reshape(-1, 1).take(chosen, axis=0),
-            normal=vectors(self.normal),
+            normal=None if self.normal is None else PointVectors(vectors(vector_values(self.normal))),
             weights=vectors(self.weights),
             position=vectors(self.position),
             inside=inside,
@@ -149,40 +142,10 @@ def point_hits(
         run=1,
         facet=facet,
         triangle=triangle,
-        ray=position.astype(np.float32)[:, :, None],
+        ray=PointVectors(position.astype(np.float32)[:, :, None]),
         depth=depth[:, None],
-        normal=normal.astype(np.float32)[:, :, None],
+        normal=PointVectors(normal.astype(np.float32)[:, :, None]),
         weights=weights.astype(np.float32)[:, :, None],
         position=position[:, :, None],
         inside=inside,
     )
-
-
-def exact_values(plane: FloatArray) -> FloatArray:
-    """Values (G, 64) of planes (3, G) at the pixels of microtiles, from their first pixel.
-
-    The planes are rounded to grids on which every sum is exact, so that neither the order of the sums
-    nor the machine can be told from the result.
-    """
-    scale = _scale(plane)
-    grid = plane / scale
-    grid += _ROUND_TO
-    grid -= _ROUND_TO
-    grid *= scale
-    return np.asarray(grid.T @ BASIS)
-
-
-def vector_values(planes: FloatArray) -> Float32Array:
-    """As `exact_values`, of vectors whose length does not matter: planes (c, 3, G) to (c, G, 64) float32."""
-    grid = (planes / _scale(planes)).astype(np.float32)
-    grid += np.float32(_ROUND_TO)
-    grid -= np.float32(_ROUND_TO)
-    return np.asarray(grid.transpose(0, 2, 1) @ _BASIS32)
-
-
-def _scale(planes: FloatArray) -> FloatArray:
-    """The power of two (G,) at or below the greatest value in a microtile of planes (..., 3, G)."""
-    reach = np.abs(planes)
-    reach[..., :2, :] *= 8.0
-    greatest = reach.max(axis=tuple(range(reach.ndim - 1)))
-    return power_of_two(np.maximum(greatest, 1e-300, out=greatest))

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
-from quiltcli.raster.blocks import SIDE, Canvas
+from quiltcli.raster.blocks import SIDE, Canvas, least_keys
 from quiltcli.raster.depth import DepthRange
-from quiltcli.raster.hits import BASIS
 from quiltcli.raster.keys import depth_part, make_keys, serial_part
 from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import Planes
+from quiltcli.raster.vectors import BASIS
 
 MICROTILE = 8
 TILE = 64
@@ -243,7 +243,7 @@ def _corner_values(
 
 def _visible(planes: Planes, spans: Spans, canvas: Canvas, bits: int) -> Spans:
     """Without the spans that lie wholly behind what covers their microtile."""
-    nearest = depth_part(canvas.keys.min(axis=1), bits)
+    nearest = depth_part(least_keys(canvas), bits)
     covers = np.flatnonzero((spans.crossed == 0) & ~planes.cut.take(spans.row))
     np.maximum.at(nearest, spans.tile[covers], spans.least[covers])
     return spans.take(np.flatnonzero(spans.greatest >= nearest.take(spans.tile)))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
-from quiltcli.raster.blocks import Canvas
+from quiltcli.raster.blocks import Canvas, least_keys
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.keys import make_keys, serial_part
 from quiltcli.raster.order import BatchOrder
@@ -84,7 +84,7 @@ def draw_small(
     for part in _slices(0, turn, _RUN):
         run = order[part]
         candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by)
-    nearest = canvas.keys.min(axis=1) if by is None and turn < order.size else None
+    nearest = least_keys(canvas) if by is None and turn < order.size else None
     for part in _slices(turn, order.size, _RUN):
         run = order[part]
         if nearest is not None:

@@ -7,25 +7,29 @@ are. A normal needs no more: its length does not matter.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
-from quiltcli.raster.blocks import SIDE
 from quiltcli.raster.hits import Wanted
 from quiltcli.raster.planes import Planes, power_of_two
+from quiltcli.raster.vectors import PointVectors
+
+_NEAR = 8.0  # pixels, about as far as a surface's pixels are from where its planes begin
 
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Planes (a, b, c) over the pixels of their blocks, of n visible pairs.
+    """Planes (a, b, c) over the pixels about a place of their own, of n visible pairs.
 
     Attributes:
         triangle: (n,) triangle index.
         bounds: (2, n) least and greatest 1/t.
         inverse: (3, n) plane of 1/t.
-        normal: (3, 3, n) planes of the normal [axis, coefficient] on the side of the eye, scaled so that
-            their values are at most about 1; none unless wanted, (0, 3, n).
+        normal: (3, 3, n) planes of the normal [axis, coefficient] on the side of the eye, of any length;
+            none unless wanted, (0, 3, n).
         weights: (3, 3, n) planes of the second and third edge function and of the sum of all; none
             unless wanted, (0, 3, n).
     """
@@ -33,16 +37,13 @@ class Surfaces:
     triangle: Int32Array
     bounds: FloatArray
     inverse: FloatArray
-    normal: FloatArray
+    normal: Float32Array
     weights: FloatArray
 
-    @property
-    def numbers(self) -> FloatArray:
-        """All of it in rows (n, 5 + …), one look-up each, in the order of the attributes."""
-        return np.concatenate((self.bounds, self.inverse, *self.normal, *self.weights)).T.copy()
 
-
-def surfaces(planes: Planes, rows: IntArray, wanted: Wanted, handed: FloatArray) -> Surfaces:
+def surfaces(
+    planes: Planes, rows: IntArray, wanted: Wanted, handed: FloatArray, x: NDArray[Any], y: NDArray[Any]
+) -> Surfaces:
     """The surfaces of some pairs.
 
     Args:
@@ -50,26 +51,34 @@ def surfaces(planes: Planes, rows: IntArray, wanted: Wanted, handed: FloatArray)
         rows: (n,) the pairs.
         wanted: what is asked for.
         handed: (K,) sign of the determinant of every block's matrix.
+        x: (n,) columns in the blocks at which the planes begin.
+        y: (n,) rows.
     """
-    edge = np.take(planes.edge, rows, axis=2)
     triangle = planes.triangle.take(rows)
-    total = edge[0] + edge[1]
-    total += edge[2]
-    normal = weights = np.zeros((0, 3, rows.size))
-    if wanted.normals is not None:
-        facing = _facing(planes, rows, handed)
-        total *= facing
-        edge *= facing
-        normal = _normals(wanted.normals, triangle, total, edge)
-    if wanted.weights:
-        weights = np.stack((edge[1], edge[2], total))
+    normal = np.zeros((0, 3, rows.size), dtype=np.float32)
+    weights = np.zeros((0, 3, rows.size))
+    if wanted.normals is not None or wanted.weights:
+        edge = _moved(np.take(planes.edge, rows, axis=2), x, y)
+        edge[0] += edge[1]
+        edge[0] += edge[2]
+        edge *= _facing(planes, rows, handed)
+        if wanted.normals is not None:
+            normal = _normals(wanted.normals.take(triangle, axis=0), edge)
+        if wanted.weights:
+            weights = edge[[1, 2, 0]]
     return Surfaces(
         triangle=triangle,
         bounds=np.stack((planes.low.take(rows), planes.high.take(rows))),
-        inverse=np.take(planes.inverse, rows, axis=1),
+        inverse=_moved(np.take(planes.inverse, rows, axis=1), x, y),
         normal=normal,
         weights=weights,
     )
+
+
+def _moved(plane: FloatArray, x: NDArray[Any], y: NDArray[Any]) -> FloatArray:
+    """Planes (..., 3, n) made to begin at x, y (n,), in place; exact for what lies on dyadic grids."""
+    plane[..., 2, :] += plane[..., 0, :] * x + plane[..., 1, :] * y
+    return plane
 
 
 def _facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
@@ -83,18 +92,26 @@ def has_one_normal(table: Float32Array, triangle: Int32Array) -> BoolArray:
     return np.asarray(~table.take(triangle, axis=0)[:, 3:9].any(axis=1))
 
 
-def one_normal(table: Float32Array, planes: Planes, rows: IntArray, handed: FloatArray) -> Float32Array:
-    """The normals (3, n, 1), on the side of the eye, of pairs whose triangles have one each."""
+def one_normal(table: Float32Array, planes: Planes, rows: IntArray, handed: FloatArray) -> PointVectors:
+    """The normals, on the side of the eye, of pairs (n,) whose triangles have one each."""
     normal = table.take(planes.triangle.take(rows), axis=0).T[0:3] * _facing(planes, rows, handed)
-    return normal.astype(np.float32)[:, :, None]
+    return PointVectors(normal.astype(np.float32)[:, :, None])
 
 
-def _normals(table: Float32Array, triangle: Int32Array, total: FloatArray, edge: FloatArray) -> FloatArray:
-    """Planes (3, 3, n) of normals, from `total` (3, n) and the edge planes (3, 3, n)."""
-    corner = np.ascontiguousarray(table.take(triangle, axis=0).T[:9], dtype=np.float64).reshape(3, 3, 1, -1)
-    normal = corner[0] * total
-    normal += corner[1] * edge[1]
-    normal += corner[2] * edge[2]
-    reach = np.abs(normal).max(axis=0)
-    reach[:2] *= SIDE
-    return np.asarray(normal / power_of_two(np.maximum(reach.max(axis=0), 1e-300)))
+def _normals(corners: Float32Array, edge: FloatArray) -> Float32Array:
+    """Planes (3, 3, n) of normals.
+
+    Args:
+        corners: (n, 12) rows of the scene's `corner_normals`.
+        edge: (3, 3, n) planes of the sum of the edge functions, of the second and of the third.
+    """
+    reach = np.abs(edge[0])
+    reach[:2] *= _NEAR
+    edge = edge / power_of_two(np.maximum(reach.max(axis=0), 1e-300))
+    total, second, third = edge.astype(np.float32)
+    corner = np.ascontiguousarray(corners.T[:9]).reshape(3, 3, 1, -1)
+    normal: Float32Array = corner[0] * total
+    part = corner[1] * second
+    normal += part
+    normal += np.multiply(corner[2], third, out=part)
+    return normal

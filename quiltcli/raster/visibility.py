@@ -9,16 +9,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, OwnerArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, OwnerArray, segments
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
-from quiltcli.raster.hits import BASIS, RUN, Hits, Wanted, exact_values, vector_values
+from quiltcli.raster.hits import RUN, Hits, Wanted
 from quiltcli.raster.keys import serial_of
 from quiltcli.raster.planes import PlaneTable
-from quiltcli.raster.surfaces import has_one_normal, one_normal, surfaces
+from quiltcli.raster.surfaces import Surfaces, has_one_normal, one_normal, surfaces
+from quiltcli.raster.vectors import (
+    BASIS,
+    PointVectors,
+    TileVectors,
+    Vectors,
+    exact_values,
+    vector_values,
+)
 
 _WHOLE, _PIXELS = 2048, 256  # microtiles at a time
 _DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
@@ -48,9 +58,9 @@ class Tiles:
     facet: Int32Array
     interior: BoolArray
 
-    def take(self, rows: IntArray | BoolArray) -> Tiles:
-        """The microtiles with these indices, or where this is true."""
-        return Tiles(*(column[rows] for column in vars(self).values()))
+    def take(self, rows: IntArray) -> Tiles:
+        """The microtiles with these indices."""
+        return Tiles(*(column.take(rows) for column in vars(self).values()))
 
     def lines(self) -> IntArray:
         """Quilt addresses (n, 8) of the first pixels of their rows."""
@@ -187,21 +197,21 @@ def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) 
 
 def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
     """Hits of all pixels of microtiles (G,) that are filled by one pair each."""
-    planes, wanted = reader.table.planes, reader.wanted
+    planes, wanted, handed = reader.table.planes, reader.wanted, reader.limits.handed
     rows = reader.table.row_of_serial.take(serial)
-    normal = None
+    normal: Vectors | None = None
     if even and wanted.normals is not None:
-        normal = one_normal(wanted.normals, planes, rows, reader.limits.handed)
+        normal = one_normal(wanted.normals, planes, rows, handed)
         wanted = replace(wanted, normals=None)
-    seen = surfaces(planes, rows, wanted, reader.limits.handed)
+    seen = surfaces(planes, rows, wanted, handed, tiles.x, tiles.y)
     if wanted.normals is not None:
-        normal = vector_values(tiles.local(seen.normal))
-    inverse = exact_values(tiles.local(seen.inverse))
+        normal = TileVectors(seen.normal.astype(np.float64))
+    inverse = exact_values(seen.inverse)
     ray, depth, position = _rays(reader, tiles)
     depth /= inverse
     weights = None
     if wanted.weights:
-        second, third, total = (exact_values(plane) for plane in tiles.local(seen.weights))
+        second, third, total = (exact_values(plane) for plane in seen.weights)
         weights = np.stack((second / total, third / total)).astype(np.float32)
     return Hits(
         first=tiles.lines().reshape(-1),
@@ -217,12 +227,12 @@ def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool)
     )
 
 
-def _rays(reader: Reader, tiles: Tiles) -> tuple[Float32Array, FloatArray, FloatArray | None]:
+def _rays(reader: Reader, tiles: Tiles) -> tuple[TileVectors, FloatArray, FloatArray | None]:
     """Rays d through the pixels of n microtiles.
 
     Returns:
-        d (3, n, 64) of any length; the depth (n, 64) of the points d; and these points (3, n, 64), the
-        eye at the origin, where positions are wanted.
+        d, of any length; the depth (n, 64) of the points d; and these points (3, n, 64), the eye at the
+        origin, where positions are wanted.
     """
     limits = reader.limits
     matrix = np.ascontiguousarray(limits.rays.transpose(1, 2, 0))
@@ -235,13 +245,13 @@ def _rays(reader: Reader, tiles: Tiles) -> tuple[Float32Array, FloatArray, Float
     else:
         look = limits.look
         depth = exact_values(look[0] * ray[0] + look[1] * ray[1] + look[2] * ray[2])
-    return vector_values(ray), depth, exact if reader.wanted.position else None
+    return TileVectors(ray), depth, exact if reader.wanted.position else None
 
 
 def _complete_tiles(reader: Reader, tiles: Tiles) -> Hits:
     """Hits of microtiles in their facets all of whose pixels see something."""
     keys = reader.canvas.keys.take(tiles.index, axis=0).reshape(-1)
-    return _pixels(reader, tiles, keys, None, tiles.lines().reshape(-1), keys.size)
+    return _pixels(reader, tiles, keys, np.arange(keys.size), tiles.lines().reshape(-1), keys.size)
 
 
 def _scattered_pixels(reader: Reader, tiles: Tiles) -> Hits:
@@ -268,7 +278,7 @@ def _owned(reader: Reader, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, In
 
 
 def _pixels(
-    reader: Reader, tiles: Tiles, keys: IntArray, pixel: IntArray | None, first: IntArray, inside: int
+    reader: Reader, tiles: Tiles, keys: IntArray, pixel: IntArray, first: IntArray, inside: int
 ) -> Hits:
     """Hits of pixels of microtiles, each a group of its own.
 
@@ -276,47 +286,84 @@ def _pixels(
         reader: the canvas.
         tiles: n microtiles.
         keys: (G,) keys of the pixels.
-        pixel: (G,) the pixels, counted through all microtiles; None for all 64·n of them.
+        pixel: (G,) the pixels, counted through all microtiles, ascending.
         first: addresses of the pixels, or of runs of them where they are all.
         inside: pixels that are not bleed.
     """
-    if pixel is None:
-        pixel = np.arange(keys.size)
-    table = reader.table
-    serial, which = _distinct(serial_of(keys, reader.bits), table.row_of_serial.size)
-    seen = surfaces(table.planes, table.row_of_serial.take(serial), reader.wanted, reader.limits.handed)
-    numbers = seen.numbers.take(which, axis=0)
-    x = (tiles.x[:, None] + _DX).reshape(-1).take(pixel).astype(np.float64)
-    y = (tiles.y[:, None] + _DY).reshape(-1).take(pixel).astype(np.float64)
+    planes, wanted = reader.table.planes, reader.wanted
+    serial, which = _distinct(serial_of(keys, reader.bits), reader.table.row_of_serial.size)
+    rows = reader.table.row_of_serial.take(serial)
+    x0, y0 = (planes.box[k].take(rows) for k in (0, 2))
+    seen = surfaces(planes, rows, wanted, reader.limits.handed, x0, y0)
+    place = np.stack((x0, y0))
+    place = np.ascontiguousarray(place.T).take(which, axis=0)
+    complete = pixel.size == tiles.x.size * 64
 
-    def values(column: int) -> FloatArray:
-        result = numbers[:, column] * x
-        result += numbers[:, column + 1] * y
-        result += numbers[:, column + 2]
-        return np.asarray(result[:, None])
+    def chosen(values: NDArray[Any]) -> NDArray[Any]:
+        """Of values (..., n, 64) those of the pixels, (..., G, 1)."""
+        values = values.reshape(*values.shape[:-2], -1, 1)
+        return values if complete else values.take(pixel, axis=-2)
 
-    inverse = values(2)
-    np.maximum(inverse, numbers[:, 0:1], out=inverse)
-    np.minimum(inverse, numbers[:, 1:2], out=inverse)
+    x = chosen(tiles.x[:, None] + _DX)[:, 0] - place[:, 0]
+    y = chosen(tiles.y[:, None] + _DY)[:, 0] - place[:, 1]
+    at = _At(which, x.astype(np.float64), y.astype(np.float64))
+    inverse = _inverse(seen, at)
     ray, depth, position = _rays(reader, tiles)
     normal = weights = None
-    if reader.wanted.normals is not None:
-        normal = np.stack([values(column).astype(np.float32) for column in (5, 8, 11)])
-    if reader.wanted.weights:
-        second, third, total = (values(numbers.shape[1] - k) for k in (9, 6, 3))
+    if wanted.normals is not None:
+        single = _At(which, x.astype(np.float32), y.astype(np.float32))
+        normal = PointVectors(_values(seen.normal, single))
+    if wanted.weights:
+        second, third, total = _values(seen.weights, at)
         weights = np.stack((second / total, third / total)).astype(np.float32)
     return Hits(
         first=first,
         run=RUN if first.size < keys.size else 1,
         facet=tiles.facet.take(pixel >> 6),
         triangle=seen.triangle.take(which),
-        ray=ray.reshape(3, -1, 1).take(pixel, axis=1),
-        depth=depth.reshape(-1, 1).take(pixel, axis=0) / inverse,
+        ray=PointVectors(chosen(vector_values(ray))),
+        depth=chosen(depth) / inverse,
         normal=normal,
         weights=weights,
-        position=None if position is None else position.reshape(3, -1, 1).take(pixel, axis=1) / inverse,
+        position=None if position is None else chosen(position) / inverse,
         inside=inside,
     )
+
+
+@dataclass(frozen=True)
+class _At:
+    """G pixels: which surface each sees, and columns and rows from where the surface's planes begin."""
+
+    which: IntArray
+    x: NDArray[Any]
+    y: NDArray[Any]
+
+
+def _inverse(seen: Surfaces, at: _At) -> FloatArray:
+    """1/t (G, 1), held between the least and the greatest of the triangle's corners."""
+    rows = np.concatenate((seen.inverse, seen.bounds)).T.copy().take(at.which, axis=0)
+    result = _plane_values(rows, at, np.empty(len(rows)))
+    np.maximum(result, rows[:, 3], out=result)
+    np.minimum(result, rows[:, 4], out=result)
+    return result[:, None]
+
+
+def _values(planes: NDArray[Any], at: _At) -> NDArray[Any]:
+    """Values (n, G, 1) of n planes (n, 3, S) of surfaces."""
+    # One look-up of a row takes as long as one of a single number.
+    rows = planes.reshape(3 * len(planes), planes.shape[2]).T.copy().take(at.which, axis=0)
+    result = np.empty((len(planes), len(rows), 1), dtype=planes.dtype)
+    for k in range(len(planes)):
+        _plane_values(rows[:, 3 * k :], at, result[k, :, 0])
+    return result
+
+
+def _plane_values(rows: NDArray[Any], at: _At, result: NDArray[Any]) -> NDArray[Any]:
+    """Put into `result` (G,) the values of planes given in rows (G, 3 or more)."""
+    np.multiply(rows[:, 0], at.x, out=result)
+    result += rows[:, 1] * at.y
+    result += rows[:, 2]
+    return result
 
 
 def _distinct(values: IntArray, count: int) -> tuple[IntArray, IntArray]:

@@ -20,6 +20,7 @@ class Materials:
         roughness: (M,) 0 to 1.
         emission: (M, 3) emitted radiance, linear.
         unlit: (M,) materials that show exactly `color`.
+        specular: (M,) 0 to 1, strength of the layer that reflects; metals reflect all the same.
     """
 
     color: Float32Array
@@ -27,6 +28,7 @@ class Materials:
     roughness: Float32Array
     emission: Float32Array
     unlit: BoolArray
+    specular: Float32Array
 
 
 @dataclass(frozen=True)

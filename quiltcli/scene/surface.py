@@ -21,6 +21,7 @@ class Surface:
         roughness: 0 to 1.
         emission: emitted radiance, linear.
         unlit: shows exactly `color`.
+        specular: 0 to 1, strength of the layer that reflects; metals reflect all the same.
     """
 
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)
@@ -28,6 +29,7 @@ class Surface:
     roughness: float = 0.5
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     unlit: bool = False
+    specular: float = 1.0
 
     def overridden(self, given: Mapping[str, Any]) -> Surface:
         """This surface with the keys of `given` in place of its own."""
@@ -43,4 +45,5 @@ def material_table(surfaces: Sequence[Surface]) -> Materials:
         roughness=np.array([s.roughness for s in surfaces], dtype=np.float32),
         emission=np.array([s.emission for s in surfaces], dtype=np.float32).reshape(-1, 3),
         unlit=np.array([s.unlit for s in surfaces], dtype=np.bool_),
+        specular=np.array([s.specular for s in surfaces], dtype=np.float32),
     )

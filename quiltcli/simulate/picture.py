@@ -81,6 +81,7 @@ def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:
             np.ones(1, np.float32),
             np.zeros((1, 3), np.float32),
             np.ones(1, dtype=np.bool_),
+            np.ones(1, np.float32),
         ),
         lights=Lights(nothing, nothing, nothing, nothing, np.zeros(3, np.float32), headlight=False),
         background=np.zeros(3, dtype=np.float32),

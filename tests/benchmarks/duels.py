@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ SCENES: Mapping[str, Callable[[], Mesh]] = {
 }
 DISPLAYS: Mapping[str, Callable[[], Place]] = {"cube": cube, "ball": lambda: ball(3)}
 NAMES = ("dragon/ball", "dragon/cube", "room/cube", "room/ball", "mixed/cube", "mixed/ball", "spheres/cube")
-_BRIEF = ("culled hits", "two-sided hits", "culled frame 1", "two-sided frame 1", "opengl lambert draw")
+_BRIEF = ("culled hits", "two-sided hits", "culled frame 1", "two-sided frame 1")
 QUICK = ("dragon/ball", "room/cube")
 
 
@@ -111,7 +112,18 @@ def _ours(
     if can_fork():
         pool = ends.enter_context(Pool(stage, [buffers], 2))
         contestants[f"{kind} frame 2"] = partial(frame, crew=pool)
+        matte = _matte(stage)
+        pool = ends.enter_context(Pool(matte, [buffers], 2))
+        contestants[f"{kind} matte 2"] = partial(
+            draw_frame, matte, viewer, buffers, dirty=np.ones(stage.blocks.facet.size, bool), crew=pool
+        )
     return contestants
+
+
+def _matte(stage: Stage) -> Stage:
+    """The stage with surfaces of a Lambert base alone."""
+    materials = replace(stage.scene.materials, specular=np.zeros(1, np.float32))
+    return replace(stage, scene=replace(stage.scene, materials=materials))
 
 
 def depth_keys(work: Work) -> None:
@@ -125,8 +137,8 @@ def _opengl(kinds: Mapping[str, Stage], viewer: Viewer, ends: ExitStack) -> Cont
     for kind, stage in kinds.items():
         quilt = ends.enter_context(opengl.Quilt(stage, binned(stage, viewer).frame, culling=kind == "culled"))
         contestants[f"opengl {kind} draw"] = partial(quilt.draw, "ggx")
+        contestants[f"opengl {kind} lambert draw"] = partial(quilt.draw, "lambert")
         if kind == "two-sided":
-            contestants["opengl lambert draw"] = partial(quilt.draw, "lambert")
             contestants["opengl read"] = quilt.read
     return contestants
 

@@ -150,4 +150,4 @@ def _clay() -> Materials:
     """One dull material."""
     color = np.array([[0.8, 0.5, 0.3]], np.float32)
     rough = np.array([0.5], np.float32)
-    return Materials(color, rough * 0, rough, color * 0, np.zeros(1, np.bool_))
+    return Materials(color, rough * 0, rough, color * 0, np.zeros(1, np.bool_), np.ones(1, np.float32))

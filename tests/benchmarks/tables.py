@@ -45,17 +45,18 @@ def target_table(results: Mapping[str, Any]) -> str:
 
 def time_table(results: Mapping[str, Any], clock: str = "wall") -> str:
     """Milliseconds of every contestant, `wall` or processor time of all processes (`cpu`)."""
-    ours = ("bin", "keys", "hits", "frame 1", "frame 2")
+    ours = ("bin", "keys", "hits", "frame 1", "frame 2", "matte 2")
     rows = []
     for name, found in results.get("duels", {}).items():
         times = found["times"]
         for kind in KINDS:
             pixels = f"{found['counts']['lit pixels'] / 1e6:.1f}"
             cells = [ms(seconds(times, f"{kind} {what}", clock)) for what in ours]
-            cells += [ms(seconds(times, who, clock)) for who in ("embree", f"opengl {kind} draw")]
+            theirs = ("embree", f"opengl {kind} draw", f"opengl {kind} lambert draw")
+            cells += [ms(seconds(times, who, clock)) for who in theirs]
             cells += [ms(seconds(times, who, clock)) for who in ("opengl read", "write zip", "write zstd")]
             rows.append((name, kind, pixels, *cells))
-    head = ("scene/display", "", "Mpixel", *ours, "Embree", "GL draws", "GL read", "ZIP", "ZSTD")
+    head = ("scene/display", "", "Mpixel", *ours, "Embree", "GL draws", "GL matte", "GL read", "ZIP", "ZSTD")
     return table(head, rows, 2)
 
 
@@ -66,18 +67,20 @@ def ratio_table(results: Mapping[str, Any], clock: str = "wall") -> str:
         times = found["times"]
         for kind in KINDS:
             keys, frame, draw = f"{kind} keys", f"{kind} frame 2", f"opengl {kind} draw"
+            matte, matte_draw = f"{kind} matte 2", f"opengl {kind} lambert draw"
             values = (
                 ratio(times, keys, "embree", "cpu"),
                 ratio(times, (f"{kind} bin", keys), "embree", "cpu"),
                 ratio(times, frame, "embree", clock),
                 ratio(times, frame, draw, clock),
-                ratio(times, frame, "opengl lambert draw", clock),
                 ratio(times, frame, (draw, "opengl read"), clock),
+                ratio(times, matte, matte_draw, clock),
+                ratio(times, matte, (matte_draw, "opengl read"), clock),
                 ratio(times, frame, "write zip", clock),
             )
             rows.append((name, kind, *map(share, values)))
     embree = ("keys / Embree", "bin + keys / Embree", "frame / Embree")
-    others = ("frame / GL draws", "frame / GL Lambert", "frame / GL draws + read", "frame / ZIP")
+    others = ("frame / GL draws", "… and read", "matte / GL matte", "… and read", "frame / ZIP")
     return table(("scene/display", "", *embree, *others), rows, 2)
 
 

@@ -57,17 +57,19 @@ def _visibility(duels: Mapping[str, Any]) -> Iterator[Target]:
 
 
 def _frames(duels: Mapping[str, Any]) -> Iterator[Target]:
-    draws, read = {}, {}
-    for name, times in duels.items():
-        for kind in KINDS:
-            key = f"{name} {kind}"
-            draws[key] = ratio(times, f"{kind} frame 2", f"opengl {kind} draw")
-            read[key] = ratio(times, f"{kind} frame 2", (f"opengl {kind} draw", "opengl read"))
-    middle = {name: value for name, value in draws.items() if name.startswith(_MIDDLE)}
-    plain = {name: value for name, value in draws.items() if name not in middle}
-    yield from _worst("frame, 2 workers / llvmpipe's draws and readback, everywhere", read, 0.7)
-    yield from _worst("frame, 2 workers / llvmpipe's draws, dragon and room", plain, 1.2)
-    yield from _worst("frame, 2 workers / llvmpipe's draws, mixed and spheres", middle, 2.0)
+    for look, ours, theirs in (("frame", "frame 2", "draw"), ("matte frame", "matte 2", "lambert draw")):
+        draws, read = {}, {}
+        for name, times in duels.items():
+            for kind in KINDS:
+                key = f"{name} {kind}"
+                draw = f"opengl {kind} {theirs}"
+                draws[key] = ratio(times, f"{kind} {ours}", draw)
+                read[key] = ratio(times, f"{kind} {ours}", (draw, "opengl read"))
+        middle = {name: value for name, value in draws.items() if name.startswith(_MIDDLE)}
+        plain = {name: value for name, value in draws.items() if name not in middle}
+        yield from _worst(f"{look}, 2 workers / llvmpipe's draws and readback, everywhere", read, 0.7)
+        yield from _worst(f"{look}, 2 workers / llvmpipe's draws, dragon and room", plain, 1.2)
+        yield from _worst(f"{look}, 2 workers / llvmpipe's draws, mixed and spheres", middle, 2.0)
     ball = duels.get("dragon/ball", {})
     whole = ratio(ball, "smaller mesh frame 2", "smaller mesh opengl whole")
     yield Target("frame, 2 workers / llvmpipe, whole mesh once a facet", "202K/ball two-sided", whole, 0.05)

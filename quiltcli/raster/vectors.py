@@ -1,0 +1,117 @@
+"""Vectors at the pixels of hits, and their products.
+
+Where a triangle fills a microtile, rays and normals are linear over its pixels. Products of them are
+planes or quadratics then: a few numbers a microtile say it all, and no vector is ever written down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quiltcli.geometry import Float32Array, FloatArray
+from quiltcli.raster.planes import power_of_two
+
+BASIS: FloatArray = np.stack((np.tile(np.arange(8.0), 8), np.repeat(np.arange(8.0), 8), np.ones(64)))
+"""Column, row and 1 (3, 64) of the pixels of a microtile, whose 64 pixels are neighbours in memory."""
+
+_QUADRATIC: FloatArray = np.stack((BASIS[0] ** 2, BASIS[0] * BASIS[1], BASIS[1] ** 2, *BASIS))
+_BASIS_OF = {3: BASIS.astype(np.float32), 6: _QUADRATIC.astype(np.float32)}
+_WEIGHT_OF = {3: np.array([8.0, 8, 1]), 6: np.array([64.0, 64, 64, 8, 8, 1])}
+# Numbers below 2 that are added to these keep 2⁻⁵⁰, 2⁻²¹ and 2⁻²⁰ in double precision.
+_ROUND_TO_DOUBLE = 6.0
+_ROUND_TO = {3: 1.5 * 2.0**31, 6: 1.5 * 2.0**32}
+
+
+@dataclass(frozen=True)
+class PointVectors:
+    """Vectors that are known one by one: values (3, G, k) float32, or (3, G, 1) one for each group."""
+
+    values: Float32Array
+
+
+@dataclass(frozen=True)
+class TileVectors:
+    """Vectors that are linear over microtiles: planes (3, 3, G) [axis, coefficient] from the first pixel."""
+
+    planes: FloatArray
+
+
+Vectors: TypeAlias = PointVectors | TileVectors
+
+
+def vector_values(vectors: Vectors) -> Float32Array:
+    """The vectors (3, G, k), or (3, G, 1) where each group has one."""
+    if isinstance(vectors, PointVectors):
+        return vectors.values
+    form = vectors.planes.transpose(1, 0, 2)  # all axes at once, as so many more microtiles
+    return single_values(form.reshape(3, -1)).reshape(3, -1, 64)
+
+
+def along(vectors: Vectors, direction: Float32Array) -> Float32Array:
+    """Products (G, k) or (G, 1) with one direction (3,)."""
+    if isinstance(vectors, PointVectors):
+        return _sum_of_products(vectors.values, direction)
+    return single_values(_sum_of_products(vectors.planes, direction))
+
+
+def products(a: Vectors, b: Vectors) -> Float32Array:
+    """Products (G, k) or (G, 1) of vectors, pixel by pixel."""
+    if isinstance(a, TileVectors) and isinstance(b, TileVectors):
+        return single_values(_quadratic(a.planes, b.planes))
+    if isinstance(a, PointVectors) and isinstance(b, TileVectors) and a.values.shape[2] == 1:
+        return single_values(_sum_of_products(b.planes, a.values[:, None, :, 0]))
+    return _sum_of_products(vector_values(a), vector_values(b))
+
+
+def _quadratic(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Coefficients (6, G) of x², xy, y², x, y and 1 in the product of two linear vectors (3, 3, G)."""
+    p, q, r = (a[:, k] for k in range(3))
+    s, t, u = (b[:, k] for k in range(3))
+    parts = (p * s, p * t + q * s, q * t, p * u + r * s, q * u + r * t, r * u)
+    return np.stack([part[0] + part[1] + part[2] for part in parts])
+
+
+def exact_values(plane: FloatArray) -> FloatArray:
+    """Values (G, 64) of planes (3, G) at the pixels of microtiles, from their first pixel.
+
+    The planes are rounded to grids on which every sum is exact, so that neither the order of the sums
+    nor the machine can be told from the result.
+    """
+    scale = _scale(plane)
+    grid = plane / scale
+    grid += _ROUND_TO_DOUBLE
+    grid -= _ROUND_TO_DOUBLE
+    grid *= scale
+    return np.asarray(grid.T @ BASIS)
+
+
+def single_values(form: FloatArray) -> Float32Array:
+    """As `exact_values`, in single precision, and of quadratics (6, G) as well: x², xy, y², x, y, 1."""
+    count = len(form)
+    scale = _scale(form)
+    grid = form / scale
+    grid += _ROUND_TO[count]
+    grid -= _ROUND_TO[count]
+    grid *= scale
+    return np.asarray(grid.astype(np.float32).T @ _BASIS_OF[count])
+
+
+def _scale(form: FloatArray) -> FloatArray:
+    """The power of two (G,) at or below the greatest term of forms (3 or 6, G) in a microtile."""
+    reach = np.abs(form)
+    reach *= _WEIGHT_OF[len(form)][:, None]
+    greatest = reach.max(axis=0)
+    return power_of_two(np.maximum(greatest, 1e-30, out=greatest))
+
+
+def _sum_of_products(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Products summed along the first axis, in the order x, y, z."""
+    result: NDArray[Any] = a[0] * b[0]
+    part = a[1] * b[1]
+    result += part
+    result += np.multiply(a[2], b[2], out=part)
+    return result
