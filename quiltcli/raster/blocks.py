@@ -71,12 +71,16 @@ def facet_rectangles(layout: Layout, bleed: int) -> IntArray:
 def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
     """Cut every facet's rectangle, bleed included, into blocks, row by row.
 
+    Blocks begin at page columns that are multiples of 8, so that the rows of microtiles are memory that
+    can be written as a whole. What a block has beyond its facet is not the facet's, and never drawn.
+
     Args:
         layout: the facets' places.
         bleed: pixels drawn past a facet's edge.
         owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
     """
     rectangle = facet_rectangles(layout, bleed)
+    rectangle[:, 0] -= np.where(rectangle[:, 2] > rectangle[:, 0], rectangle[:, 0] % 8, 0)
     extent = rectangle[:, 2:] - rectangle[:, :2]
     counts = -(-extent // SIDE)
     start = np.concatenate(([0], np.cumsum(counts[:, 0] * counts[:, 1])))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -106,10 +107,22 @@ class Hits:
         if self.run == 1:
             buffer[self.first] = values.reshape(-1)
             return
-        # As elements of `run` pixels that begin at every address: one write for each run.
+        # As elements of `run` pixels: one write for each run.
         kind = np.dtype((np.void, self.run * buffer.itemsize))
-        runs = np.ndarray((buffer.size - self.run + 1,), kind, buffer.data, 0, (buffer.itemsize,))
-        runs[self.first] = np.ascontiguousarray(values).reshape(-1, self.run).view(kind)[:, 0]
+        elements = np.ascontiguousarray(values).reshape(-1, self.run).view(kind)[:, 0]
+        if self._whole_runs is not None:
+            buffer[: buffer.size // RUN * RUN].view(kind)[self._whole_runs] = elements
+            return
+        # Elements that begin at every address take three times as long.
+        every = np.ndarray((buffer.size - self.run + 1,), kind, buffer.data, 0, (buffer.itemsize,))
+        every[self.first] = elements
+
+    @cached_property
+    def _whole_runs(self) -> IntArray | None:
+        """Addresses of the runs counted in runs; None where they do not begin at multiples of them."""
+        if np.bitwise_or.reduce(self.first) & (RUN - 1):
+            return None
+        return self.first >> RUN.bit_length() - 1
 
 
 def point_hits(
