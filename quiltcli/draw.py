@@ -190,7 +190,7 @@ def draw_frame(
         else:
             clear(stage, buffers, only)
     with clock.stage("rasterize and shade"):
-        frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs, stage.owners)
+        frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
         written = np.diff(frame.pairs.start) > 0
         if has_background(stage):
             written |= rays.lit[stage.blocks.facet]

@@ -318,7 +318,7 @@ class _Workplace:
             seen, plan, stage = self._arena.seen, self.plan, self._stage
             sight = Sight(seen.vertices, stage.scene.triangles, seen.cut)
             pairs = self._arena.pairs()
-            self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs, stage.owners)
+            self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs)
         return draw_batch(self._stage, self._frame, batch, self._buffers[index])
 
     @property

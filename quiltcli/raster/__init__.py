@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, OwnerArray
+from quiltcli.geometry import BoolArray
 from quiltcli.homography import QuiltRays
 from quiltcli.orders import DepthOrder
 from quiltcli.raster.blocks import Blocks, block_window, cut_batches, cut_blocks, new_canvas, ray_matrices
@@ -62,7 +62,6 @@ class Frame:
         rays: rays through the quilt.
         blocks: the blocks of the layout.
         pairs: triangles by block.
-        owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
         order: the depth buffer that decides what is nearest; None for exact depth.
     """
 
@@ -71,7 +70,6 @@ class Frame:
     rays: QuiltRays
     blocks: Blocks
     pairs: BlockPairs
-    owners: OwnerArray
     order: DepthOrder | None = None
 
 
@@ -120,4 +118,4 @@ def rasterize(
     draw_small(pairs, np.flatnonzero(some & small), table, canvas, limits, bits, by)
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
     draw_large(table.add(pairs, np.flatnonzero(some & ~small)).compact(), canvas, limits, bits, by)
-    yield from read_canvas(canvas, table, frame.blocks, limits, frame.owners, bits, wanted or Wanted())
+    yield from read_canvas(canvas, table, frame.blocks, limits, bits, wanted or Wanted())

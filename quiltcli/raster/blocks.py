@@ -34,12 +34,15 @@ class Blocks:
         y0: (B,) page row of the block's first pixel.
         width: (B,) columns.
         height: (B,) rows.
+        margin: (B,) columns at the left that lie beside the facet's rectangle.
         address: (B,) flat quilt address of the block's first pixel.
         stride: (B,) pixels from one row to the next, the page's width.
         columns: (F,) blocks from left to right in a facet's rectangle.
         tiles_across: (B,) microtiles from left to right in a block.
         tile_start: (B+1,) offsets of every block's microtiles among those of all blocks.
         interior: (microtiles,) those all of whose pixels lie in the block's facet.
+        owned: (microtiles, 8) uint8, bits of the pixels that are the facet's or its bleed, row by row.
+        inside: (microtiles, 8) uint8, bits of those that lie in the facet.
     """
 
     start: IntArray
@@ -48,12 +51,15 @@ class Blocks:
     y0: IntArray
     width: IntArray
     height: IntArray
+    margin: IntArray
     address: IntArray
     stride: IntArray
     columns: IntArray
     tiles_across: IntArray
     tile_start: IntArray
     interior: BoolArray
+    owned: NDArray[np.uint8]
+    inside: NDArray[np.uint8]
 
 
 def facet_rectangles(layout: Layout, bleed: int) -> IntArray:
@@ -80,7 +86,8 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
         owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
     """
     rectangle = facet_rectangles(layout, bleed)
-    rectangle[:, 0] -= np.where(rectangle[:, 2] > rectangle[:, 0], rectangle[:, 0] % 8, 0)
+    margin = np.where(rectangle[:, 2] > rectangle[:, 0], rectangle[:, 0] % 8, 0)
+    rectangle[:, 0] -= margin
     extent = rectangle[:, 2:] - rectangle[:, :2]
     counts = -(-extent // SIDE)
     start = np.concatenate(([0], np.cumsum(counts[:, 0] * counts[:, 1])))
@@ -95,6 +102,7 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
     address = layout.page_offset[page] + y0 * stride + x0
     across = -(-width // 8)
     tile_start = np.concatenate(([0], np.cumsum(across * -(-height // 8))))
+    owned, inside = _owned_pixels(facet, width, height, address, stride, owners)
     return Blocks(
         start=start,
         facet=facet.astype(np.int32),
@@ -102,12 +110,15 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
         y0=y0,
         width=width,
         height=height,
+        margin=np.where(rank % columns[facet] == 0, margin[facet], 0),
         address=address,
         stride=stride,
         columns=columns,
         tiles_across=across,
         tile_start=tile_start,
-        interior=_interior_tiles(facet, width, height, address, stride, owners),
+        interior=(inside == 255).all(axis=1),
+        owned=owned,
+        inside=inside,
     )
 
 
@@ -125,21 +136,28 @@ def block_window(flat: NDArray[T], blocks: Blocks, block: int) -> NDArray[T]:
     return window(flat, *(int(number) for number in rectangle))
 
 
-def _interior_tiles(
+def _owned_pixels(
     facet: IntArray,
     width: IntArray,
     height: IntArray,
     address: IntArray,
     stride: IntArray,
     owners: OwnerArray,
-) -> BoolArray:
-    """Microtiles of all blocks that lie wholly in their block and in its facet's polygon."""
-    found = []
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Which pixels of all blocks' microtiles their facets own, and which of them are no bleed, as bits."""
+    owned, inside = [np.zeros((0, 8), dtype=np.uint8)], [np.zeros((0, 8), dtype=np.uint8)]
     for f, w, h, first, step in zip(facet, width, height, address, stride, strict=True):
-        mine = np.zeros((-(-h // 8) * 8, -(-w // 8) * 8), dtype=np.bool_)
-        np.equal(window(owners, first, step, w, h), f + 1, out=mine[:h, :w])
-        found.append(mine.reshape(mine.shape[0] // 8, 8, -1, 8).all(axis=(1, 3)).ravel())
-    return np.concatenate(found) if found else np.zeros(0, dtype=np.bool_)
+        mine = np.zeros((-(-h // 8) * 8, -(-w // 8) * 8), dtype=owners.dtype)
+        mine[:h, :w] = window(owners, first, step, w, h)
+        owned.append(_tile_bits((mine == f + 1) | (mine == -f - 1)))
+        inside.append(_tile_bits(mine == f + 1))
+    return np.concatenate(owned), np.concatenate(inside)
+
+
+def _tile_bits(mask: BoolArray) -> NDArray[np.uint8]:
+    """A mask of whole microtiles as bits (microtiles, 8), row by row."""
+    rows = np.packbits(mask, axis=1)
+    return rows.reshape(len(mask) // 8, 8, -1).transpose(0, 2, 1).reshape(-1, 8)
 
 
 def cut_batches(pair_counts: IntArray, blocks: Blocks, wanted: BoolArray) -> list[tuple[int, int]]:

@@ -136,6 +136,7 @@ def warp(
     triangle = block_pairs.triangle.take(block_pairs.start[block].take(place) + rank)
     matrices = np.ascontiguousarray(matrices.transpose(1, 2, 0))
     extent = blocks.width[block].astype(np.float64), blocks.height[block].astype(np.float64)
+    margin = blocks.margin[block].astype(np.int32)
     corners = np.empty((3, 3, place.size))
     box = np.empty((4, place.size), dtype=np.int32)
     for at in range(0, place.size, _CHUNK):
@@ -144,4 +145,5 @@ def warp(
         project(world, np.take(matrices, place[part], axis=2), corners[:, :, part])
         width, height = (size.take(place[part]) for size in extent)
         box[:, part] = pixel_boxes(corners[:, :, part], width, height)
+        np.maximum(box[0, part], margin.take(place[part]), out=box[0, part])
     return Warped(triangle, place.astype(np.int32), corners, box, sight.cut.take(triangle))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, OwnerArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.hits import RUN, Hits, Wanted
@@ -47,6 +47,7 @@ class Tiles:
         stride: (n,) pixels from one row of the page to the next.
         facet: (n,) facet index.
         interior: (n,) those all of whose pixels lie in the facet.
+        number: (n,) their index among the microtiles of all blocks.
     """
 
     index: IntArray
@@ -57,6 +58,7 @@ class Tiles:
     stride: IntArray
     facet: Int32Array
     interior: BoolArray
+    number: IntArray
 
     def take(self, rows: IntArray) -> Tiles:
         """The microtiles with these indices."""
@@ -82,7 +84,6 @@ class Reader:
     table: PlaneTable
     blocks: Blocks
     limits: DepthRange
-    owners: OwnerArray
     bits: int
     wanted: Wanted
 
@@ -92,7 +93,6 @@ def read_canvas(
     table: PlaneTable,
     blocks: Blocks,
     limits: DepthRange,
-    owners: OwnerArray,
     bits: int,
     wanted: Wanted,
 ) -> Iterator[Hits]:
@@ -103,14 +103,13 @@ def read_canvas(
         table: the planes of all pairs that were.
         blocks: the blocks.
         limits: how depth is measured, with the rays of the canvas's blocks.
-        owners: who owns each quilt pixel; keys outside their facet and its bleed are dropped.
         bits: bits of the serial in a key.
         wanted: what the hits shall tell.
     """
     tiles = _drawn_tiles(canvas, blocks)
     if not tiles.index.size:
         return
-    reader = Reader(canvas, table, blocks, limits, owners, bits, wanted)
+    reader = Reader(canvas, table, blocks, limits, bits, wanted)
     serial, complete = _sort_out(reader, tiles)
     whole = np.flatnonzero(serial >= 0)
     is_even = _even(reader, serial[whole])
@@ -138,6 +137,7 @@ def _drawn_tiles(canvas: Canvas, blocks: Blocks) -> Tiles:
     row, column = np.divmod(rank, canvas.tiles_across[place])
     block = canvas.block[place]
     x, y, stride = column * 8, row * 8, blocks.stride[block]
+    number = blocks.tile_start[block] + rank
     return Tiles(
         index=index,
         block=place,
@@ -146,7 +146,8 @@ def _drawn_tiles(canvas: Canvas, blocks: Blocks) -> Tiles:
         address=blocks.address[block] + y * stride + x,
         stride=stride,
         facet=blocks.facet[block],
-        interior=blocks.interior[blocks.tile_start[block] + rank],
+        interior=blocks.interior[number],
+        number=number,
     )
 
 
@@ -262,19 +263,21 @@ def _scattered_pixels(reader: Reader, tiles: Tiles) -> Hits:
 
 
 def _owned(reader: Reader, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, IntArray, int]:
-    """Those of the `drawn` pixels (n, 64) of microtiles that lie in their block and that its facet owns.
+    """Those of the `drawn` pixels (n, 64) of microtiles that their facet owns.
 
     Returns:
         the pixels, counted through all microtiles; their quilt addresses; how many are no bleed.
     """
-    block = reader.canvas.block[tiles.block]
-    drawn &= (reader.blocks.width[block] - tiles.x)[:, None] > _DX
-    drawn &= (reader.blocks.height[block] - tiles.y)[:, None] > _DY
+    owned, inside = (
+        np.unpackbits(bits.take(tiles.number, axis=0), axis=1).view(np.bool_)
+        for bits in (reader.blocks.owned, reader.blocks.inside)
+    )
+    drawn &= owned
+    inside &= drawn
     pixel = np.flatnonzero(drawn)
-    address = (tiles.lines()[:, :, None] + np.arange(8)).reshape(-1).take(pixel)
-    owner = reader.owners.take(address)
-    own = np.flatnonzero(np.abs(owner) == tiles.facet.take(pixel >> 6) + 1)
-    return pixel.take(own), address.take(own), int(np.count_nonzero(owner.take(own) > 0))
+    address = tiles.lines().reshape(-1).take(pixel >> 3)
+    address += pixel & 7
+    return pixel, address, int(np.count_nonzero(inside))
 
 
 def _pixels(

@@ -112,7 +112,7 @@ def binned(stage: Stage, seen_by: Viewer) -> Work:
     """Bin a frame the way `draw_frame` does, and draw nothing."""
     rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, seen_by.eye), seen_by.eye)
     found = bin_frame(plan_of(stage, seen_by, rays))
-    frame = Frame(seen_by, found.sight, rays, stage.blocks, found.pairs, stage.owners)
+    frame = Frame(seen_by, found.sight, rays, stage.blocks, found.pairs)
     return Work(stage.scene, frame, batches(frame))
 
 
