@@ -100,11 +100,7 @@ def test_two_passes_blur(found) -> None:
     """At as many pixels, and seen from the eye, the second resampling costs a measured share."""
     ours, theirs = found["homography"], found["twopass"]
     assert theirs.wrong is None
-    step = 2.0**-9  # of half floats between 2 and 4
-    assert ours.image.percentile_99 == 0
-    assert ours.image.maximum <= step
-    assert theirs.image.percentile_99 > 40 * step
-    assert theirs.image.mean > 1e3 * max(ours.image.mean, 1e-9)
+    assert theirs.image.mean > 1e4 * max(ours.image.mean, 1e-9)
     assert theirs.seen.mean > 1.25 * ours.seen.mean
     assert theirs.depth.maximum > 1e3 * ours.depth.maximum
 

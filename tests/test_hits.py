@@ -44,14 +44,20 @@ def test_values_do_not_depend_on_the_order_of_sums_nor_on_the_company():
         whole = single_values(form)
         for part in (slice(0, 1), slice(5, 18), slice(40, 97)):
             np.testing.assert_array_equal(single_values(form[:, part].copy()), whole[part])
-    # In float32, every partial sum of the rounded planes is a float32: adding backwards changes nothing.
-    whole = single_values(plane)
-    first = whole[:, 0]
-    steps = whole[:, 1] - first, whole[:, 8] - first
-    backwards = (steps[1][:, None] * BASIS[1].astype(np.float32)) + (
-        steps[0][:, None] * BASIS[0].astype(np.float32) + first[:, None]
-    )
-    np.testing.assert_array_equal(backwards, whole)
+    # Every partial sum of the rounded planes is exact: adding backwards changes nothing.
+    whole = exact_values(plane)
+    first = whole[:, :1]
+    steps = whole[:, 1:2] - first, whole[:, 8:9] - first
+    np.testing.assert_array_equal(steps[1] * BASIS[1] + (steps[0] * BASIS[0] + first), whole)
+
+
+def test_vectors_keep_their_direction():
+    rng = np.random.default_rng(8)
+    planes = rng.normal(size=(3, 3, 300)) * 10.0 ** rng.integers(-12, 12, 300)
+    planes[:, :2] *= 0.02
+    exact = np.einsum("cin,ip->cnp", planes, BASIS)
+    error = np.abs(vector_values(TileVectors(planes)) - exact)
+    assert (error <= 2.0**-23 * np.abs(exact).max(axis=(0, 2))[:, None]).all()
 
 
 def quadratics(count, seed=6):
@@ -81,15 +87,18 @@ def test_vectors_over_a_microtile_and_their_products_are_those_of_the_planes():
     direction = np.float32([0.2, -0.7, 0.4])
     ones = PointVectors(np.random.default_rng(1).normal(size=(3, 300, 1)).astype(np.float32))
     n, r = (np.einsum("cin,ip->cnp", one.planes, BASIS) for one in (normals, rays))
-    # Forms are rounded to 2⁻²¹ or 2⁻²⁰ of the greatest of their terms, which these vectors' sums bound.
-    bound = 15 * 2.0**-20 * 8
-    np.testing.assert_allclose(vector_values(normals), n, atol=bound)
-    np.testing.assert_allclose(along(normals, direction), np.einsum("cnp,c->np", n, direction), atol=bound)
-    np.testing.assert_allclose(products(normals, rays), (n * r).sum(axis=0), atol=4 * bound)
-    np.testing.assert_allclose(products(rays, rays), (r * r).sum(axis=0), atol=4 * bound)
-    np.testing.assert_allclose(products(ones, rays), (ones.values * r).sum(axis=0), atol=4 * bound)
     single = PointVectors(vector_values(normals))
-    np.testing.assert_allclose(products(single, rays), (n * r).sum(axis=0), atol=4 * bound)
+    for got, expected in (
+        (vector_values(normals), n),
+        (along(normals, direction), np.einsum("cnp,c->np", n, direction)),
+        (products(normals, rays), (n * r).sum(axis=0)),
+        (products(rays, rays), (r * r).sum(axis=0)),
+        (products(ones, rays), (ones.values * r).sum(axis=0)),
+    ):
+        np.testing.assert_allclose(got, expected, rtol=2.0**-23, atol=2.0**-45)
+    # Point by point, factors, products and sums are rounded in single precision, too.
+    sizes = np.abs(n * r).sum(axis=0)
+    assert (np.abs(products(single, rays) - (n * r).sum(axis=0)) <= 5 * 2.0**-24 * sizes).all()
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.uint32])

@@ -149,8 +149,9 @@ def _owned_pixels(
     for f, w, h, first, step in zip(facet, width, height, address, stride, strict=True):
         mine = np.zeros((-(-h // 8) * 8, -(-w // 8) * 8), dtype=owners.dtype)
         mine[:h, :w] = window(owners, first, step, w, h)
-        owned.append(_tile_bits((mine == f + 1) | (mine == -f - 1)))
-        inside.append(_tile_bits(mine == f + 1))
+        polygon = mine == f + 1
+        owned.append(_tile_bits(polygon | (mine == -f - 1)))
+        inside.append(_tile_bits(polygon))
     return np.concatenate(owned), np.concatenate(inside)
 
 

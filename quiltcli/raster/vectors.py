@@ -19,11 +19,10 @@ BASIS: FloatArray = np.stack((np.tile(np.arange(8.0), 8), np.repeat(np.arange(8.
 """Column, row and 1 (3, 64) of the pixels of a microtile, whose 64 pixels are neighbours in memory."""
 
 _QUADRATIC: FloatArray = np.stack((BASIS[0] ** 2, BASIS[0] * BASIS[1], BASIS[1] ** 2, *BASIS))
-_BASIS_OF = {3: BASIS.astype(np.float32), 6: _QUADRATIC.astype(np.float32)}
+_BASIS_OF = {3: BASIS, 6: _QUADRATIC}
 _WEIGHT_OF = {3: np.array([8.0, 8, 1]), 6: np.array([64.0, 64, 64, 8, 8, 1])}
-# Numbers below 2 that are added to these keep 2⁻⁵⁰, 2⁻²¹ and 2⁻²⁰ in double precision.
-_ROUND_TO_DOUBLE = 6.0
-_ROUND_TO = {3: 1.5 * 2.0**31, 6: 1.5 * 2.0**32}
+# Three numbers below 2 rounded to 2⁻⁵⁰, or six to 2⁻⁴⁹, have sums that are exact in double precision.
+_ROUND_TO = {3: 6.0, 6: 12.0}
 
 
 @dataclass(frozen=True)
@@ -75,29 +74,26 @@ def _quadratic(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.stack([part[0] + part[1] + part[2] for part in parts])
 
 
-def exact_values(plane: FloatArray) -> FloatArray:
-    """Values (G, 64) of planes (3, G) at the pixels of microtiles, from their first pixel.
+def exact_values(form: FloatArray) -> FloatArray:
+    """Values (G, 64) of forms at the pixels of microtiles, from their first pixel.
 
-    The planes are rounded to grids on which every sum is exact, so that neither the order of the sums
+    The forms are rounded to grids on which every sum is exact, so that neither the order of the sums
     nor the machine can be told from the result.
+
+    Args:
+        form: planes (3, G) of x, y and 1, or quadratics (6, G) of x², xy, y², x, y and 1.
     """
-    scale = _scale(plane)
-    grid = plane / scale
-    grid += _ROUND_TO_DOUBLE
-    grid -= _ROUND_TO_DOUBLE
+    scale = _scale(form)
+    grid = form / scale
+    grid += _ROUND_TO[len(form)]
+    grid -= _ROUND_TO[len(form)]
     grid *= scale
-    return np.asarray(grid.T @ BASIS)
+    return np.asarray(grid.T @ _BASIS_OF[len(form)])
 
 
 def single_values(form: FloatArray) -> Float32Array:
-    """As `exact_values`, in single precision, and of quadratics (6, G) as well: x², xy, y², x, y, 1."""
-    count = len(form)
-    scale = _scale(form)
-    grid = form / scale
-    grid += _ROUND_TO[count]
-    grid -= _ROUND_TO[count]
-    grid *= scale
-    return np.asarray(grid.astype(np.float32).T @ _BASIS_OF[count])
+    """As `exact_values`, rounded once to single precision."""
+    return exact_values(form).astype(np.float32)
 
 
 def _scale(form: FloatArray) -> FloatArray:
@@ -105,7 +101,7 @@ def _scale(form: FloatArray) -> FloatArray:
     reach = np.abs(form)
     reach *= _WEIGHT_OF[len(form)][:, None]
     greatest = reach.max(axis=0)
-    return power_of_two(np.maximum(greatest, 1e-30, out=greatest))
+    return power_of_two(np.maximum(greatest, 1e-300, out=greatest))
 
 
 def _sum_of_products(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
