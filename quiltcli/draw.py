@@ -309,7 +309,7 @@ def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Bu
             rgba = np.ones((4, hits.depth.size), dtype=np.float32)
             for color, mine in zip(shade(stage.scene, frame.viewer.eye, hits), rgba, strict=False):
                 np.minimum(color, MOST_HALF, out=mine.reshape(hits.depth.shape))
-            found.append((hits.pixel.ravel(), rgba))
+            found.append((hits.pixel, np.stack([hits.drawn(c.reshape(hits.depth.shape)) for c in rgba])))
     if not found or "rgba" not in stage.job.output.channels:
         return
     pixel = np.concatenate([p for p, _ in found])

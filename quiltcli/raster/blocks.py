@@ -41,6 +41,7 @@ class Blocks:
         tiles_across: (B,) microtiles from left to right in a block.
         tile_start: (B+1,) offsets of every block's microtiles among those of all blocks.
         interior: (microtiles,) those all of whose pixels lie in the block's facet.
+        used: (microtiles,) those that have pixels of the facet or its bleed.
         owned: (microtiles, 8) uint8, bits of the pixels that are the facet's or its bleed, row by row.
         inside: (microtiles, 8) uint8, bits of those that lie in the facet.
     """
@@ -58,6 +59,7 @@ class Blocks:
     tiles_across: IntArray
     tile_start: IntArray
     interior: BoolArray
+    used: BoolArray
     owned: NDArray[np.uint8]
     inside: NDArray[np.uint8]
 
@@ -117,6 +119,7 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
         tiles_across=across,
         tile_start=tile_start,
         interior=(inside == 255).all(axis=1),
+        used=owned.any(axis=1),
         owned=owned,
         inside=inside,
     )
@@ -196,6 +199,8 @@ class Canvas:
         tile_start: (K+1,) offsets of every block's microtiles.
         tiles_across: (K,) microtiles from left to right in a block.
         tiles_down: (K,) from top to bottom.
+        number: (M,) every microtile's index among those of all blocks.
+        used: (M,) microtiles that have pixels of their facet; nothing needs to be drawn in others.
         keys: (M, 64) int64 depth keys, 0 where nothing has been drawn.
         touched: (M,) microtiles that have keys.
         filler: (M,) one more than the serial of the one pair that shows in a microtile, fills it and
@@ -206,6 +211,8 @@ class Canvas:
     tile_start: IntArray
     tiles_across: IntArray
     tiles_down: IntArray
+    number: IntArray
+    used: BoolArray
     keys: IntArray
     touched: BoolArray
     filler: IntArray
@@ -217,11 +224,15 @@ def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
     tile_start = np.concatenate(([0], np.cumsum(tiles)))
     count = int(tile_start[-1])
     across = blocks.tiles_across[block]
+    place, number = segments(tile_start)
+    number += blocks.tile_start[block].take(place)
     return Canvas(
         block=block,
         tile_start=tile_start,
         tiles_across=across,
         tiles_down=tiles // across,
+        number=number,
+        used=blocks.used.take(number),
         keys=np.zeros((count, 64), dtype=np.int64),
         touched=np.zeros(count, dtype=np.bool_),
         filler=np.zeros(count, dtype=np.int64),

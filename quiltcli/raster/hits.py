@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
-from quiltcli.raster.vectors import PointVectors, Vectors, vector_values
+from quiltcli.raster.vectors import PointVectors, Vectors
 
 RUN = 8
 """Pixels of a microtile that are neighbours in the quilt."""
@@ -33,14 +33,15 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Hits:
-    """G groups of k quilt pixels; all pixels of a group see one triangle.
+    """What is seen at the pixels of G groups of k; all of a group see one triangle.
 
     A group is a microtile of 64 pixels that one triangle fills, or a single pixel: what belongs to
-    the triangle is looked up once a group.
+    the triangle is looked up once a group. P of the G·k pixels are to be drawn.
 
     Attributes:
-        first: (R,) quilt addresses of the first of `run` neighbouring pixels; R·run = G·k, in their order.
+        first: (R,) quilt addresses of the first of `run` neighbouring pixels; R·run = P, in their order.
         run: 1, or RUN.
+        chosen: (P,) the pixels that are drawn, counted through all groups; None where all are.
         facet: (G,) facet index.
         triangle: (G,) triangle index.
         ray: directions from the eye to the points that are seen, world axes, of any length.
@@ -48,11 +49,12 @@ class Hits:
         normal: interpolated normals on the side of the eye, of any length; None unless wanted.
         weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
         position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
-        inside: how many of the pixels lie in their facet's polygon, not in its bleed.
+        inside: how many of the drawn pixels lie in their facet's polygon, not in its bleed.
     """
 
     first: IntArray
     run: int
+    chosen: IntArray | None
     facet: Int32Array
     triangle: Int32Array
     ray: Vectors
@@ -64,52 +66,28 @@ class Hits:
 
     @property
     def pixel(self) -> IntArray:
-        """Quilt addresses (G, k)."""
-        result: IntArray = (self.first[:, None] + np.arange(self.run)).reshape(self.depth.shape)
+        """Quilt addresses (P,)."""
+        result: IntArray = (self.first[:, None] + np.arange(self.run)).reshape(-1)
         return result
 
-    def pixels(self, chosen: IntArray, first: IntArray, inside: int) -> Hits:
-        """Some of the pixels (P,), counted through all groups, each as a group of its own.
-
-        Args:
-            chosen: the pixels.
-            first: (P,) their quilt addresses.
-            inside: how many of them are not bleed.
-        """
-        group = chosen // self.depth.shape[1]
-
-        def vectors(values: NDArray[Any] | None) -> Any:
-            if values is None:
-                return None
-            index = group if values.shape[2] == 1 else chosen
-            return values.reshape(len(values), -1, 1).take(index, axis=1)
-
-        return Hits(
-            first=first,
-            run=1,
-            facet=self.facet.take(group),
-            triangle=self.triangle.take(group),
-            ray=PointVectors(vectors(vector_values(self.ray))),
-            depth=self.depth.reshape(-1, 1).take(chosen, axis=0),
-            normal=None if self.normal is None else PointVectors(vectors(vector_values(self.normal))),
-            weights=vectors(self.weights),
-            position=vectors(self.position),
-            inside=inside,
-        )
+    def drawn(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values (P,) at the drawn pixels, of values (G, k), (G, 1) for whole groups, or (1, 1) for all."""
+        if values.size > 1 and self.chosen is not None and values.shape[1] == 1 < self.depth.shape[1]:
+            return values.reshape(-1).take(self.chosen // self.depth.shape[1])
+        if values.shape != self.depth.shape:
+            values = np.broadcast_to(values, self.depth.shape)
+        return values.reshape(-1) if self.chosen is None else values.reshape(-1).take(self.chosen)
 
     def put(self, buffer: NDArray[Any], values: NDArray[Any]) -> None:
-        """Write values (G, k), (G, 1) for whole groups, or (1, 1) for all, into a flat buffer of any type."""
+        """Write values, as for `drawn`, into a flat buffer of any type."""
         values = values.astype(buffer.dtype, copy=False)
-        if values.size == 1:
-            values = np.broadcast_to(values, (1, self.run))
-        elif values.shape != self.depth.shape:
-            values = np.broadcast_to(values, self.depth.shape)
         if self.run == 1:
-            buffer[self.first] = values.reshape(-1)
+            buffer[self.first] = values.reshape(-1) if values.size == 1 else self.drawn(values)
             return
         # As elements of `run` pixels: one write for each run.
         kind = np.dtype((np.void, self.run * buffer.itemsize))
-        elements = np.ascontiguousarray(values).reshape(-1, self.run).view(kind)[:, 0]
+        runs = np.broadcast_to(values, (1, self.run)) if values.size == 1 else self.drawn(values)
+        elements = np.ascontiguousarray(runs).reshape(-1, self.run).view(kind)[:, 0]
         if self._whole_runs is not None:
             buffer[: buffer.size // RUN * RUN].view(kind)[self._whole_runs] = elements
             return
@@ -153,6 +131,7 @@ def point_hits(
     return Hits(
         first=first,
         run=1,
+        chosen=None,
         facet=facet,
         triangle=triangle,
         ray=PointVectors(position.astype(np.float32)[:, :, None]),

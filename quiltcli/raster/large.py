@@ -196,17 +196,23 @@ def _class_spans(
         values, down, up = _corner_values(np.take(planes.edge[k], row, axis=1), x0, y0, i, j)
         inside &= values > -up
         crossed |= (values <= -down).view(np.uint8) << np.uint8(k)
+    block = planes.block.take(row)
     keep = np.flatnonzero(inside)
-    values, down, up = _corner_values(np.take(planes.inverse, row, axis=1), x0, y0, i, j)
     cell, piece = np.divmod(keep, row.size)
-    row = row.take(piece)
-    values = values.ravel().take(keep)
-    block, low, high = planes.block.take(row), planes.low.take(row), planes.high.take(row)
     x = x0.take(piece) + cell % columns
     y = y0.take(piece) + cell // columns
+    place = block.take(piece)
+    tile = canvas.tile_start.take(place) + y * canvas.tiles_across.take(place) + x
+    used = np.flatnonzero(canvas.used.take(tile))
+    if used.size < tile.size:
+        keep, piece, x, y, tile = (values.take(used) for values in (keep, piece, x, y, tile))
+    values, down, up = _corner_values(np.take(planes.inverse, row, axis=1), x0, y0, i, j)
+    row = row.take(piece)
+    values = values.ravel().take(keep)
+    low, high = planes.low.take(row), planes.high.take(row)
     return Spans(
         row=row,
-        tile=canvas.tile_start.take(block) + y * canvas.tiles_across.take(block) + x,
+        tile=tile,
         x=x * MICROTILE,
         y=y * MICROTILE,
         crossed=crossed.ravel().take(keep),

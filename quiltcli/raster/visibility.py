@@ -131,13 +131,13 @@ def _parts(rows: IntArray, step: int) -> Iterator[IntArray]:
 
 def _drawn_tiles(canvas: Canvas, blocks: Blocks) -> Tiles:
     """The microtiles of a canvas in which anything was drawn."""
-    index = np.flatnonzero(canvas.touched | (canvas.filler > 0))
+    index = np.flatnonzero((canvas.touched | (canvas.filler > 0)) & canvas.used)
     place, rank = segments(canvas.tile_start)
     place, rank = place[index], rank[index]
     row, column = np.divmod(rank, canvas.tiles_across[place])
     block = canvas.block[place]
     x, y, stride = column * 8, row * 8, blocks.stride[block]
-    number = blocks.tile_start[block] + rank
+    number = canvas.number[index]
     return Tiles(
         index=index,
         block=place,
@@ -192,8 +192,7 @@ def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) 
         some = tiles.take(border)
         hits = _filled_tiles(reader, some, serial[border], even=even)
         pixel, address, inside = _owned(reader, some, np.ones(hits.depth.shape, dtype=np.bool_))
-        if pixel.size:
-            yield hits.pixels(pixel, address, inside)
+        yield replace(hits, first=address, run=1, chosen=pixel, inside=inside)
 
 
 def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
@@ -217,6 +216,7 @@ def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool)
     return Hits(
         first=tiles.lines().reshape(-1),
         run=RUN,
+        chosen=None,
         facet=tiles.facet,
         triangle=seen.triangle,
         ray=ray,
@@ -322,6 +322,7 @@ def _pixels(
     return Hits(
         first=first,
         run=RUN if first.size < keys.size else 1,
+        chosen=None,
         facet=tiles.facet.take(pixel >> 6),
         triangle=seen.triangle.take(which),
         ray=PointVectors(chosen(vector_values(ray))),

@@ -15,6 +15,7 @@ import OpenEXR
 from quiltcli import raster
 from quiltcli.draw import Buffers, Stage, draw_frame, new_buffers
 from quiltcli.exr import write_exr
+from quiltcli.geometry import BoolArray
 from quiltcli.pool import Pool, can_fork, shared_buffers
 from quiltcli.unmap import page_of
 from quiltcli.viewer import Viewer
@@ -68,13 +69,14 @@ def duel(name: str, rounds: int, scratch: Path, *, quick: bool = False) -> dict[
     kinds = {"culled": culled(stage), "two-sided": stage}
     works = {kind: binned(made, viewer) for kind, made in kinds.items()}
     buffers = (shared_buffers if can_fork() else new_buffers)(stage)
+    dirty = np.ones(stage.blocks.facet.size, dtype=np.bool_)
     rays = list(pixel_rays(stage, works["two-sided"].frame))
     counts: dict[str, Any] = {"lit pixels": sum(map(len, rays))}
     with ExitStack() as ends:
         contestants: dict[str, Callable[[], object]] = {}
         for kind, work in works.items():
             counts[kind] = _counts(kinds[kind], viewer, work, buffers)
-            contestants |= _ours(kind, kinds[kind], viewer, work, buffers, ends)
+            contestants |= _ours(kind, kinds[kind], viewer, work, buffers, dirty, ends)
         contestants["embree"] = caster(works["two-sided"].frame.sight, rays)
         if not opengl.renderer().startswith("-"):
             contestants |= _opengl(kinds, viewer, ends)
@@ -97,12 +99,16 @@ def _counts(stage: Stage, viewer: Viewer, work: Work, buffers: Buffers) -> dict[
 
 
 def _ours(
-    kind: str, stage: Stage, viewer: Viewer, work: Work, buffers: Buffers, ends: ExitStack
+    kind: str,
+    stage: Stage,
+    viewer: Viewer,
+    work: Work,
+    buffers: Buffers,
+    dirty: BoolArray,
+    ends: ExitStack,
 ) -> Contestants:
-    """Our own ways: binning, depth keys, hits and whole frames."""
-    frame = partial(
-        draw_frame, stage, viewer, buffers, dirty=np.ones(stage.blocks.facet.size, dtype=np.bool_)
-    )
+    """Our own ways: binning, depth keys, hits and whole frames, cleared as in a sequence."""
+    frame = partial(draw_frame, stage, viewer, buffers, dirty=dirty)
     contestants: dict[str, Callable[[], object]] = {
         f"{kind} bin": lambda: binned(stage, viewer),
         f"{kind} keys": lambda: depth_keys(work),
@@ -115,7 +121,7 @@ def _ours(
         matte = _matte(stage)
         pool = ends.enter_context(Pool(matte, [buffers], 2))
         contestants[f"{kind} matte 2"] = partial(
-            draw_frame, matte, viewer, buffers, dirty=np.ones(stage.blocks.facet.size, bool), crew=pool
+            draw_frame, matte, viewer, buffers, dirty=dirty, crew=pool
         )
     return contestants
 

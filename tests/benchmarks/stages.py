@@ -120,7 +120,7 @@ def all_hits(work: Work) -> int:
     """Rasterize every batch; the number of pixels that see the scene."""
     wanted = replace(shading_wants(work.scene), position=True, weights=True)
     return sum(
-        hits.depth.size for batch in work.batches for hits in rasterize(work.frame, batch, wanted=wanted)
+        hits.pixel.size for batch in work.batches for hits in rasterize(work.frame, batch, wanted=wanted)
     )
 
 
