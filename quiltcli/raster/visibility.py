@@ -30,7 +30,7 @@ from quiltcli.raster.vectors import (
     vector_values,
 )
 
-_WHOLE, _PIXELS = 2048, 256  # microtiles at a time
+_WHOLE, _PIXELS = 2048, 512  # microtiles at a time
 _DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
 
 
