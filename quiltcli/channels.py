@@ -48,7 +48,7 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
 
 
 def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Sequence[Values]:
-    colors = [half_floats(np.minimum(color, MOST_HALF)) for color in shade(scene, viewer.eye, hits)]
+    colors = [half_floats(color) for color in shade(scene, viewer.eye, hits)]
     return *colors, np.ones((1, 1), dtype=np.float16)
 
 
@@ -81,6 +81,7 @@ def _point(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
     return hits.position + viewer.eye[:, None, None]
 
 
+_MOST_HALF_BITS = np.uint32(MOST_HALF.astype(np.float16).view(np.uint16))
 _HALF, _FLOAT, _UINT = np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.uint32)
 
 # Depths are measured in double precision and rounded once. A pixel that sees nothing is infinitely
@@ -131,7 +132,7 @@ def fill(
 
 
 def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
-    """Numbers from 0 to the largest half float rounded to half floats, what lies in the middle upward.
+    """Numbers from 0 on rounded to half floats, what lies in the middle upward, and none to infinity.
 
     A product with 2⁻¹¹² has the exponent of a half float, small ones denormal as theirs are; then the
     bits that a half float lacks are rounded away. `astype` would take five times as long.
@@ -139,4 +140,5 @@ def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
     bits = (values * np.float32(2.0**-112)).view(np.uint32)
     bits += np.uint32(0x1000)
     bits >>= np.uint32(13)
+    np.minimum(bits, _MOST_HALF_BITS, out=bits)
     return bits.astype(np.uint16).view(np.float16)

@@ -34,6 +34,7 @@ from quiltcli.raster import (
     batches,
     block_window,
     cut_blocks,
+    draw,
     rasterize,
 )
 from quiltcli.report import FrameRecord
@@ -124,8 +125,8 @@ class Crew(Protocol):
     def clear(self, blocks: IntArray, buffers: Buffers) -> None:
         """Empty the pixels of blocks."""
 
-    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers) -> int:
-        """Draw batches; how many pixels of facets show the scene."""
+    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray) -> int:
+        """Draw batches, as `draw_batch`; how many pixels of facets show the scene."""
 
 
 @dataclass(frozen=True)
@@ -143,12 +144,16 @@ class Threads:
         """Empty the pixels of blocks."""
         clear_blocks(self.stage, blocks, buffers)
 
-    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers) -> int:
+    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray) -> int:
         """Draw batches, each in a thread; how many pixels of facets show the scene."""
+
+        def drawn(batch: tuple[int, int]) -> int:
+            return draw_batch(self.stage, frame, batch, buffers, stale[slice(*batch)])
+
         if self.threads == 1:
-            return sum(draw_batch(self.stage, frame, batch, buffers) for batch in work)
+            return sum(map(drawn, work))
         with ThreadPoolExecutor(self.threads) as pool:
-            return sum(pool.map(lambda batch: draw_batch(self.stage, frame, batch, buffers), work))
+            return sum(pool.map(drawn, work))
 
 
 def draw_frame(
@@ -184,17 +189,19 @@ def draw_frame(
     with clock.stage("bin"):
         rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
         binned = crew.bin(viewer, rays)
+    frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
+    written = np.diff(frame.pairs.start) > 0
+    stale = np.zeros(written.size, dtype=np.bool_)
     with clock.stage("clear"):
         if only is None and dirty is not None:
-            crew.clear(np.flatnonzero(dirty), buffers)
+            stale = dirty & written & mends_itself(stage)
+            crew.clear(np.flatnonzero(dirty & ~stale), buffers)
         else:
             clear(stage, buffers, only)
     with clock.stage("rasterize and shade"):
-        frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
-        written = np.diff(frame.pairs.start) > 0
         if has_background(stage):
             written |= rays.lit[stage.blocks.facet]
-        visible = crew.draw(frame, batches(frame, written), buffers)
+        visible = crew.draw(frame, batches(frame, written), buffers, stale)
         if dirty is not None:
             dirty[:] = written if only is None else dirty | written
     return FrameRecord(
@@ -242,6 +249,14 @@ def has_background(stage: Stage) -> bool:
     return "rgba" in stage.job.output.channels and bool(stage.scene.background.any())
 
 
+def mends_itself(stage: Stage) -> bool:
+    """Whether drawing a batch may empty what it does not fill, which is less to write.
+
+    Not with a background, which lies under everything, nor with several samples a pixel, which see more.
+    """
+    return not has_background(stage) and stage.job.render.samples == 1
+
+
 def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
     """Give the pixels of these blocks that their facets own the background's colour, if there is one."""
     if not has_background(stage):
@@ -255,8 +270,15 @@ def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
             np.copyto(pixels, value, where=mine, casting="same_kind")
 
 
-def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers) -> int:
+def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, stale: BoolArray) -> int:
     """Draw one batch into the buffers; its pixels belong to no other batch.
+
+    Args:
+        stage: what the job's frames share.
+        frame: the frame.
+        batch: the range of blocks.
+        buffers: written to.
+        stale: blocks of the range that still hold another frame and have to be emptied where nothing is seen.
 
     Returns:
         How many pixels of facets, bleed left out, show the scene.
@@ -273,7 +295,11 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
     if frame.order is not None:
         wanted = replace(wanted, position=True)
     visible = 0
-    for hits in rasterize(frame, batch, wanted=wanted):
+    drawing = draw(frame, batch)
+    for places in drawing.missed(np.flatnonzero(stale) + batch[0]) if stale.any() else ():
+        for name, value in empty_values(stage).items():
+            places.put(buffers[name], np.full(1, value, dtype=buffers[name].dtype))
+    for hits in drawing.hits(wanted):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)

@@ -234,19 +234,19 @@ class Pool:
         parts = [part for part in np.array_split(blocks, _SHARES * len(self._workers)) if part.size]
         self._share_out(_Item("clear", (part, index)) for part in parts)
 
-    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers) -> int:
-        """Draw batches into one of the pool's buffers.
+    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray) -> int:
+        """Draw batches into one of the pool's buffers, as `draw.draw_batch`.
 
         Returns:
             How many pixels of facets show the scene.
         """
         pairs = frame.pairs
         if pairs.start is not self._arena.start:
-            return Threads(self._stage, len(self._workers)).draw(frame, work, buffers)
+            return Threads(self._stage, len(self._workers)).draw(frame, work, buffers, stale)
         index = self._index(buffers)
         cost = [int(pairs.start[last] - pairs.start[first]) for first, last in work]
         dearest = np.argsort(cost, kind="stable")[::-1].tolist()
-        return sum(self._share_out(_Item("draw", (work[i], index)) for i in dearest))
+        return sum(self._share_out(_Item("draw", (work[i], index, stale[slice(*work[i])])) for i in dearest))
 
     def _index(self, buffers: Buffers) -> int:
         return next(i for i, known in enumerate(self._buffers) if known is buffers)
@@ -312,14 +312,14 @@ class _Workplace:
         """Empty the pixels of some blocks."""
         clear_blocks(self._stage, blocks, self._buffers[index])
 
-    def draw(self, batch: tuple[int, int], index: int) -> int:
+    def draw(self, batch: tuple[int, int], index: int, stale: BoolArray) -> int:
         """Draw a batch; its visible pixels."""
         if self._frame is None:
             seen, plan, stage = self._arena.seen, self.plan, self._stage
             sight = Sight(seen.vertices, stage.scene.triangles, seen.cut)
             pairs = self._arena.pairs()
             self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs)
-        return draw_batch(self._stage, self._frame, batch, self._buffers[index])
+        return draw_batch(self._stage, self._frame, batch, self._buffers[index], stale)
 
     @property
     def plan(self) -> BinPlan:

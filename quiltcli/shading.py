@@ -30,7 +30,7 @@ _DIELECTRIC = 0.04
 _LEAST_COSINE = np.float32(1e-4)
 _LEAST_DISTANCE2 = np.float32(1e-6)
 _LEAST_LENGTH2 = np.float32(1e-30)
-_ONE, _HALF = np.float32(1), np.float32(0.5)
+_ONE, _HALF, _ROOT2 = np.float32(1), np.float32(0.5), np.float32(math.sqrt(2))
 
 Values: TypeAlias = "Float32Array | np.float32"
 
@@ -73,7 +73,7 @@ class _Points:
         normal: shading normals on the side of the eye.
         normal_scale: (n, k) or (n, 1) one over their lengths.
         ray: directions from the eye.
-        ray_scale: (n, k) one over their lengths, negative: towards the eye.
+        ray_scale: (n, k) one over their lengths, negative: towards the eye; None where nobody asks for it.
         base: 3 values, base colour.
         steady: 3 values, light that needs no lamp: ambient and emission, or the colour of an unlit surface.
         diffuse: share of light for the Lambert base, over π.
@@ -83,7 +83,7 @@ class _Points:
     normal: Vectors
     normal_scale: Float32Array
     ray: Vectors
-    ray_scale: Float32Array
+    ray_scale: Float32Array | None
     base: tuple[Values, ...]
     steady: tuple[Values, ...]
     diffuse: Values
@@ -122,6 +122,7 @@ def shade(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]
         nl, rl = products(points.normal, towards), products(points.ray, towards)
         _add_light(total, points, nl, rl, color, nearness)
     if lights.headlight:
+        assert points.ray_scale is not None
         nl = products(points.normal, points.ray)
         nl *= points.ray_scale
         _add_light(total, points, nl, np.reciprocal(points.ray_scale), np.full(3, HEADLIGHT, np.float32))
@@ -144,9 +145,11 @@ def _points(scene: Scene, hits: Hits) -> _Points:
         color = _colors(scene.corner_colors, hits)
         base = tuple(v * c for v, c in zip(base, color, strict=True))
         ambient = tuple(v * c for v, c in zip(ambient, color, strict=True))
-    normal_scale, ray_scale = _over_length(hits.normal), _over_length(hits.ray, -_ONE)
-    layer = None
-    if np.any(specular90):
+    normal_scale = _over_length(hits.normal)
+    ray_scale = layer = None
+    if np.any(specular90) or scene.lights.headlight:
+        ray_scale = _over_length(hits.ray, -_ONE)
+    if np.any(specular90) and ray_scale is not None:
         nv = products(hits.normal, hits.ray)
         nv *= normal_scale
         nv *= ray_scale
@@ -227,6 +230,7 @@ def _add_light(
     base = received
     if layer is not None:
         assert rl is not None
+        assert points.ray_scale is not None
         rl *= points.ray_scale
         glints = _glints(layer, nl, rl, received, color)
         base = layer.leaving * (_let_through(nl, layer.coat) * received)
@@ -265,22 +269,31 @@ def _glints(
     spread *= (a2 - _ONE) * _HALF
     spread += _ONE
     spread *= spread
-    masking = layer.root * nl
-    masking += layer.front * _masking_root(nl, a2)
+    masking = layer.front * _masking_root(nl, a2)
+    masking += layer.root * nl
     spread *= masking
-    specular = np.divide(received * (a2 * np.float32(0.5 / math.pi)), spread, out=spread)
-    cosine = np.sqrt(half_angle, out=half_angle)
-    cosine *= np.float32(math.sqrt(0.5))
-    rim = _fifth(cosine)
-    rim *= specular
-    specular -= rim
-    rim *= layer.specular90
+    strength = np.divide(received, spread, out=spread)  # but for a factor α²/2π
+    rim = _fifth(np.subtract(_ROOT2, np.sqrt(half_angle, out=half_angle), out=half_angle))
+    factor = a2 * np.float32(0.5 / math.pi)
     if color[0] == color[1] == color[2] and layer.specular0[0] is layer.specular0[1]:
-        specular *= layer.specular0[0]
-        specular += rim
-        specular *= color[0]
-        return specular, specular, specular
-    return tuple((layer.specular0[k] * specular + rim) * color[k] for k in range(3))
+        return (_fresnel(layer.specular0[0], layer, rim, factor * color[0], strength, rim),) * 3
+    return tuple(_fresnel(layer.specular0[k], layer, rim, factor * color[k], strength) for k in range(3))
+
+
+def _fresnel(
+    specular0: Values,
+    layer: _Layer,
+    rim: Float32Array,
+    factor: Values,
+    strength: Float32Array,
+    out: Float32Array | None = None,
+) -> Float32Array:
+    """`factor`·`strength`·(F₀ + (F₉₀ − F₀)(1 − v·h)⁵), given `rim`, the fifth power of √2 − √2·v·h."""
+    level0 = factor * specular0
+    result = np.multiply(rim, (factor * layer.specular90 - level0) * np.float32(2**-2.5), out=out)
+    result += level0
+    result *= strength
+    return result
 
 
 def _masking_root(cosine: Float32Array, alpha2: Values) -> Float32Array:
@@ -294,18 +307,17 @@ def _masking_root(cosine: Float32Array, alpha2: Values) -> Float32Array:
 
 def _let_through(cosine: Float32Array, coat: Values) -> Float32Array:
     """What a layer lets through at an angle: 1 less the rise of its reflection towards the rim."""
-    result = _fifth(cosine)
+    result = _fifth(_ONE - cosine)
     result *= -coat
     result += _ONE
     return result
 
 
-def _fifth(cosine: Float32Array) -> Float32Array:
-    """(1 − cosine)⁵, of Schlick's approximation."""
-    rest = _ONE - cosine
-    result: Float32Array = rest * rest
+def _fifth(value: Float32Array) -> Float32Array:
+    """The fifth power: of 1 − cosine, in Schlick's approximation."""
+    result: Float32Array = value * value
     result *= result
-    result *= rest
+    result *= value
     return result
 
 

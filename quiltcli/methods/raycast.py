@@ -56,7 +56,7 @@ def cast_frame(
     def draw(address: IntArray) -> int:
         pixels = places(address, stage.layout, stage.owners, rays)
         hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals)
-        if hits.first.size:
+        if hits.triangle.size:
             fill(buffers, stage.job.output.channels, stage.scene, viewer, hits)
         return hits.inside
 

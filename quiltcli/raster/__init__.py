@@ -13,12 +13,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray
+from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.homography import QuiltRays
 from quiltcli.orders import DepthOrder
-from quiltcli.raster.blocks import Blocks, block_window, cut_batches, cut_blocks, new_canvas, ray_matrices
+from quiltcli.raster.blocks import (
+    Blocks,
+    Canvas,
+    block_window,
+    cut_batches,
+    cut_blocks,
+    new_canvas,
+    ray_matrices,
+)
 from quiltcli.raster.depth import DepthRange, triangles_in_range
-from quiltcli.raster.hits import Hits, Wanted
+from quiltcli.raster.hits import Hits, Places, Wanted
 from quiltcli.raster.keys import serial_bits
 from quiltcli.raster.large import draw_large
 from quiltcli.raster.order import BatchOrder
@@ -32,12 +40,13 @@ from quiltcli.raster.prewarp import (
     warp,
 )
 from quiltcli.raster.small import LIMIT, draw_small
-from quiltcli.raster.visibility import read_canvas
+from quiltcli.raster.visibility import missed_pixels, read_canvas
 from quiltcli.viewer import Viewer
 
 __all__ = [
     "BlockPairs",
     "Blocks",
+    "Drawing",
     "Frame",
     "Hits",
     "Sight",
@@ -46,6 +55,7 @@ __all__ = [
     "block_keys",
     "block_window",
     "cut_blocks",
+    "draw",
     "pairs_by_block",
     "rasterize",
     "triangles_in_range",
@@ -84,22 +94,50 @@ def batches(frame: Frame, wanted: BoolArray | None = None) -> list[tuple[int, in
     return cut_batches(counts, frame.blocks, counts > 0 if wanted is None else wanted)
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """A batch all triangles of which are drawn; its pixels are yet to be read.
+
+    Attributes:
+        blocks: the blocks of the layout.
+        canvas: depth keys.
+        table: planes of the pairs.
+        limits: how depth is measured.
+        bits: bits of the serial in a key.
+    """
+
+    blocks: Blocks
+    canvas: Canvas
+    table: PlaneTable
+    limits: DepthRange
+    bits: int
+
+    def hits(self, wanted: Wanted) -> Iterator[Hits]:
+        """What the pixels see, each of the batch at most once."""
+        return read_canvas(self.canvas, self.table, self.blocks, self.limits, self.bits, wanted)
+
+    def missed(self, block: IntArray) -> Iterator[Places]:
+        """The pixels of facets that see nothing, in those of these blocks that have pairs."""
+        return missed_pixels(self.canvas, self.blocks, np.isin(self.canvas.block, block))
+
+
 def rasterize(
     frame: Frame,
     batch: tuple[int, int],
     sample: tuple[float, float] = (0.0, 0.0),
     wanted: Wanted | None = None,
 ) -> Iterator[Hits]:
-    """What the pixels of one batch see.
+    """What the pixels of one batch see; `wanted` is what the hits shall tell. See `draw`."""
+    return draw(frame, batch, sample).hits(wanted or Wanted())
+
+
+def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.0, 0.0)) -> Drawing:
+    """Draw the triangles of one batch.
 
     Args:
         frame: the frame.
         batch: one of `batches(frame)`.
         sample: where in the pixel to look, in pixels from its centre.
-        wanted: what the hits shall tell beside the triangle, the ray and its depth.
-
-    Yields:
-        Hits of distinct pixels, each pixel of the batch at most once.
     """
     counts = np.diff(frame.pairs.start)
     block = batch[0] + np.flatnonzero(counts[batch[0] : batch[1]])
@@ -118,4 +156,4 @@ def rasterize(
     draw_small(pairs, np.flatnonzero(some & small), table, canvas, limits, bits, by)
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
     draw_large(table.add(pairs, np.flatnonzero(some & ~small)).compact(), canvas, limits, bits, by)
-    yield from read_canvas(canvas, table, frame.blocks, limits, bits, wanted or Wanted())
+    return Drawing(frame.blocks, canvas, table, limits, bits)

@@ -119,7 +119,7 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
         tiles_across=across,
         tile_start=tile_start,
         interior=(inside == 255).all(axis=1),
-        used=owned.any(axis=1),
+        used=np.asarray(owned.any(axis=1)),
         owned=owned,
         inside=inside,
     )

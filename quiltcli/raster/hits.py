@@ -32,37 +32,16 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Hits:
-    """What is seen at the pixels of G groups of k; all of a group see one triangle.
-
-    A group is a microtile of 64 pixels that one triangle fills, or a single pixel: what belongs to
-    the triangle is looked up once a group. P of the G·k pixels are to be drawn.
+class Places:
+    """P quilt pixels, in runs of neighbours.
 
     Attributes:
-        first: (R,) quilt addresses of the first of `run` neighbouring pixels; R·run = P, in their order.
+        first: (R,) quilt addresses of the first pixels of the runs; R·run = P, in their order.
         run: 1, or RUN.
-        chosen: (P,) the pixels that are drawn, counted through all groups; None where all are.
-        facet: (G,) facet index.
-        triangle: (G,) triangle index.
-        ray: directions from the eye to the points that are seen, world axes, of any length.
-        depth: (G, k) the point's depth as the viewer measures it, metres.
-        normal: interpolated normals on the side of the eye, of any length; None unless wanted.
-        weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
-        position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
-        inside: how many of the drawn pixels lie in their facet's polygon, not in its bleed.
     """
 
     first: IntArray
     run: int
-    chosen: IntArray | None
-    facet: Int32Array
-    triangle: Int32Array
-    ray: Vectors
-    depth: FloatArray
-    normal: Vectors | None
-    weights: Float32Array | None
-    position: FloatArray | None
-    inside: int
 
     @property
     def pixel(self) -> IntArray:
@@ -70,24 +49,15 @@ class Hits:
         result: IntArray = (self.first[:, None] + np.arange(self.run)).reshape(-1)
         return result
 
-    def drawn(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values (P,) at the drawn pixels, of values (G, k), (G, 1) for whole groups, or (1, 1) for all."""
-        if values.size > 1 and self.chosen is not None and values.shape[1] == 1 < self.depth.shape[1]:
-            return values.reshape(-1).take(self.chosen // self.depth.shape[1])
-        if values.shape != self.depth.shape:
-            values = np.broadcast_to(values, self.depth.shape)
-        return values.reshape(-1) if self.chosen is None else values.reshape(-1).take(self.chosen)
-
     def put(self, buffer: NDArray[Any], values: NDArray[Any]) -> None:
-        """Write values, as for `drawn`, into a flat buffer of any type."""
-        values = values.astype(buffer.dtype, copy=False)
+        """Write values of the buffer's type, (P,) or (1,) for all, into a flat buffer."""
         if self.run == 1:
-            buffer[self.first] = values.reshape(-1) if values.size == 1 else self.drawn(values)
+            buffer[self.first] = values
             return
         # As elements of `run` pixels: one write for each run.
         kind = np.dtype((np.void, self.run * buffer.itemsize))
-        runs = np.broadcast_to(values, (1, self.run)) if values.size == 1 else self.drawn(values)
-        elements = np.ascontiguousarray(runs).reshape(-1, self.run).view(kind)[:, 0]
+        runs = np.repeat(values, self.run) if values.size == 1 else np.ascontiguousarray(values)
+        elements = runs.view(kind)
         if self._whole_runs is not None:
             buffer[: buffer.size // RUN * RUN].view(kind)[self._whole_runs] = elements
             return
@@ -101,6 +71,57 @@ class Hits:
         if np.bitwise_or.reduce(self.first) & (RUN - 1):
             return None
         return self.first >> RUN.bit_length() - 1
+
+
+@dataclass(frozen=True)
+class Hits:
+    """What is seen at the pixels of G groups of k; all of a group see one triangle.
+
+    A group is a microtile of 64 pixels that one triangle fills, or a single pixel: what belongs to
+    the triangle is looked up once a group. P of the G·k pixels are to be drawn.
+
+    Attributes:
+        places: where the P pixels that are drawn lie in the quilt.
+        chosen: (P,) these pixels, counted through all groups; None where all are drawn.
+        facet: (G,) facet index.
+        triangle: (G,) triangle index.
+        ray: directions from the eye to the points that are seen, world axes, of any length.
+        depth: (G, k) the point's depth as the viewer measures it, metres.
+        normal: interpolated normals on the side of the eye, of any length; None unless wanted.
+        weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
+        position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
+        inside: how many of the drawn pixels lie in their facet's polygon, not in its bleed.
+    """
+
+    places: Places
+    chosen: IntArray | None
+    facet: Int32Array
+    triangle: Int32Array
+    ray: Vectors
+    depth: FloatArray
+    normal: Vectors | None
+    weights: Float32Array | None
+    position: FloatArray | None
+    inside: int
+
+    @property
+    def pixel(self) -> IntArray:
+        """Quilt addresses (P,)."""
+        return self.places.pixel
+
+    def drawn(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values (P,) of the drawn pixels, of values (G, k), or (G, 1) for whole groups."""
+        k = self.depth.shape[1]
+        index = self.chosen
+        if values.shape[1] < k:
+            index = np.arange(values.size * k) // k if index is None else index // k
+        flat = values.reshape(-1)
+        return flat if index is None else np.asarray(flat.take(index))
+
+    def put(self, buffer: NDArray[Any], values: NDArray[Any]) -> None:
+        """Write values (G, k), (G, 1) for whole groups, or (1, 1) for all, into a flat buffer of any type."""
+        values = values.astype(buffer.dtype, copy=False)
+        self.places.put(buffer, values.reshape(-1) if values.size == 1 else self.drawn(values))
 
 
 def point_hits(
@@ -129,8 +150,7 @@ def point_hits(
     towards = np.sign(-(rows[9:12] * position).sum(axis=0))
     normal = (rows[0:3] + weights[0] * rows[3:6] + weights[1] * rows[6:9]) * towards
     return Hits(
-        first=first,
-        run=1,
+        places=Places(first, 1),
         chosen=None,
         facet=facet,
         triangle=triangle,

@@ -93,8 +93,15 @@ def has_one_normal(table: Float32Array, triangle: Int32Array) -> BoolArray:
 
 
 def one_normal(table: Float32Array, planes: Planes, rows: IntArray, handed: FloatArray) -> PointVectors:
-    """The normals, on the side of the eye, of pairs (n,) whose triangles have one each."""
-    normal = table.take(planes.triangle.take(rows), axis=0).T[0:3] * _facing(planes, rows, handed)
+    """The normals, on the side of the eye, of pairs (n,) whose triangles have one each.
+
+    Returns:
+        (3, n, 1), or (3, 1, 1) where all are the same.
+    """
+    triangle, facing = planes.triangle.take(rows), _facing(planes, rows, handed)
+    if bool((triangle == triangle[0]).all() and (facing == facing[0]).all()):
+        triangle, facing = triangle[:1], facing[:1]
+    normal = table.take(triangle, axis=0).T[0:3] * facing
     return PointVectors(normal.astype(np.float32)[:, :, None])
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
-from quiltcli.raster.hits import RUN, Hits, Wanted
+from quiltcli.raster.hits import RUN, Hits, Places, Wanted
 from quiltcli.raster.keys import serial_of
 from quiltcli.raster.planes import PlaneTable
 from quiltcli.raster.surfaces import Surfaces, has_one_normal, one_normal, surfaces
@@ -31,6 +31,7 @@ from quiltcli.raster.vectors import (
 )
 
 _WHOLE, _PIXELS = 2048, 512  # microtiles at a time
+_MANY = 512  # microtiles of one triangle that are worth a part of their own
 _DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
 
 
@@ -69,6 +70,10 @@ class Tiles:
         result: IntArray = self.address[:, None] + self.stride[:, None] * np.arange(8)
         return result
 
+    def places(self) -> Places:
+        """All of their pixels."""
+        return Places(self.lines().reshape(-1), RUN)
+
     def local(self, planes: FloatArray) -> FloatArray:
         """Planes (..., 3, n) from the microtiles' first pixels, of planes over their blocks."""
         result = planes.copy()
@@ -106,22 +111,50 @@ def read_canvas(
         bits: bits of the serial in a key.
         wanted: what the hits shall tell.
     """
-    tiles = _drawn_tiles(canvas, blocks)
+    tiles = _tiles(canvas, blocks, np.flatnonzero((canvas.touched | (canvas.filler > 0)) & canvas.used))
     if not tiles.index.size:
         return
     reader = Reader(canvas, table, blocks, limits, bits, wanted)
     serial, complete = _sort_out(reader, tiles)
     whole = np.flatnonzero(serial >= 0)
-    is_even = _even(reader, serial[whole])
+    triangle = table.planes.triangle.take(table.row_of_serial.take(serial[whole]))
+    is_even = np.zeros(whole.size, dtype=np.bool_)
+    if wanted.normals is not None:
+        is_even = has_one_normal(wanted.normals, triangle)
+    inner = tiles.interior[whole]
+    for part in _parts_by_triangle(whole[inner & is_even], triangle[inner & is_even]):
+        yield _filled_tiles(reader, tiles.take(part), serial[part], even=True)
+    for part in _parts(whole[inner & ~is_even], _WHOLE):
+        yield _filled_tiles(reader, tiles.take(part), serial[part], even=False)
     for even in (True, False):
-        for part in _parts(whole[is_even == even], _WHOLE):
-            yield from _whole_tiles(reader, tiles.take(part), serial[part], even=even)
+        for part in _parts(whole[~inner & (is_even == even)], _WHOLE):
+            yield _border_tiles(reader, tiles.take(part), serial[part], even=even)
     for part in _parts(np.flatnonzero(complete), _PIXELS):
         yield _complete_tiles(reader, tiles.take(part))
     for part in _parts(np.flatnonzero(~complete & (serial < 0)), _PIXELS):
         hits = _scattered_pixels(reader, tiles.take(part))
-        if hits.first.size:
+        if hits.triangle.size:
             yield hits
+
+
+def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: BoolArray) -> Iterator[Places]:
+    """The pixels of facets at which nothing was drawn.
+
+    Args:
+        canvas: what was drawn.
+        blocks: the blocks.
+        wanted: (K,) the blocks of the canvas that are asked about.
+    """
+    place, _ = segments(canvas.tile_start)
+    bare = np.flatnonzero(canvas.used & (canvas.filler == 0) & wanted[place])
+    tiles = _tiles(canvas, blocks, bare)
+    empty = tiles.interior & ~canvas.touched[bare]
+    for part in _parts(np.flatnonzero(empty), _WHOLE):
+        yield tiles.take(part).places()
+    for part in _parts(np.flatnonzero(~empty), _WHOLE):
+        some = tiles.take(part)
+        _, address, _ = _owned(blocks, some, canvas.keys.take(some.index, axis=0) == 0)
+        yield Places(address, 1)
 
 
 def _parts(rows: IntArray, step: int) -> Iterator[IntArray]:
@@ -129,9 +162,22 @@ def _parts(rows: IntArray, step: int) -> Iterator[IntArray]:
         yield rows[at : at + step]
 
 
-def _drawn_tiles(canvas: Canvas, blocks: Blocks) -> Tiles:
-    """The microtiles of a canvas in which anything was drawn."""
-    index = np.flatnonzero((canvas.touched | (canvas.filler > 0)) & canvas.used)
+def _parts_by_triangle(rows: IntArray, triangle: Int32Array) -> Iterator[IntArray]:
+    """Microtiles (n,) in parts; those of a triangle that fills many are by themselves.
+
+    What a triangle has one of is one number for all pixels of such a part, and numbers are faster.
+    """
+    order = np.argsort(triangle, kind="stable")
+    start = np.flatnonzero(np.diff(triangle[order], prepend=-1))
+    count = np.diff(start, append=order.size)
+    many = count >= _MANY
+    for first, size in zip(start[many].tolist(), count[many].tolist(), strict=True):
+        yield from _parts(rows[order[first : first + size]], _WHOLE)
+    yield from _parts(rows[np.sort(order[np.repeat(~many, count)])], _WHOLE)
+
+
+def _tiles(canvas: Canvas, blocks: Blocks, index: IntArray) -> Tiles:
+    """Where the microtiles of a canvas with these indices lie."""
     place, rank = segments(canvas.tile_start)
     place, rank = place[index], rank[index]
     row, column = np.divmod(rank, canvas.tiles_across[place])
@@ -171,32 +217,18 @@ def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
     return serial, complete & tiles.interior
 
 
-def _even(reader: Reader, serial: IntArray) -> BoolArray:
-    """Which pairs' triangles have one normal all over; none where no normals are wanted."""
-    if reader.wanted.normals is None:
-        return np.zeros(serial.size, dtype=np.bool_)
-    table = reader.table
-    triangle = table.planes.triangle.take(table.row_of_serial.take(serial))
-    return has_one_normal(reader.wanted.normals, triangle)
-
-
-def _whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Iterator[Hits]:
-    """Hits of microtiles (n,) that are filled by one pair each; `even` where each pair has one normal.
-
-    Of microtiles at the border of a facet, only the pixels that the facet owns.
-    """
-    inner, border = np.flatnonzero(tiles.interior), np.flatnonzero(~tiles.interior)
-    if inner.size:
-        yield _filled_tiles(reader, tiles.take(inner), serial[inner], even=even)
-    if border.size:
-        some = tiles.take(border)
-        hits = _filled_tiles(reader, some, serial[border], even=even)
-        pixel, address, inside = _owned(reader, some, np.ones(hits.depth.shape, dtype=np.bool_))
-        yield replace(hits, first=address, run=1, chosen=pixel, inside=inside)
+def _border_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
+    """As `_filled_tiles`, of microtiles at the border of a facet: only the pixels that the facet owns."""
+    hits = _filled_tiles(reader, tiles, serial, even=even)
+    pixel, address, inside = _owned(reader.blocks, tiles, np.ones(hits.depth.shape, dtype=np.bool_))
+    return replace(hits, places=Places(address, 1), chosen=pixel, inside=inside)
 
 
 def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
-    """Hits of all pixels of microtiles (G,) that are filled by one pair each."""
+    """Hits of all pixels of microtiles (G,) that are filled by one pair each.
+
+    With `even`, each of their triangles has one normal.
+    """
     planes, wanted, handed = reader.table.planes, reader.wanted, reader.limits.handed
     rows = reader.table.row_of_serial.take(serial)
     normal: Vectors | None = None
@@ -214,8 +246,7 @@ def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool)
         second, third, total = (exact_values(plane) for plane in seen.weights)
         weights = np.stack((second / total, third / total)).astype(np.float32)
     return Hits(
-        first=tiles.lines().reshape(-1),
-        run=RUN,
+        places=tiles.places(),
         chosen=None,
         facet=tiles.facet,
         triangle=seen.triangle,
@@ -252,17 +283,18 @@ def _rays(reader: Reader, tiles: Tiles) -> tuple[TileVectors, FloatArray, FloatA
 def _complete_tiles(reader: Reader, tiles: Tiles) -> Hits:
     """Hits of microtiles in their facets all of whose pixels see something."""
     keys = reader.canvas.keys.take(tiles.index, axis=0).reshape(-1)
-    return _pixels(reader, tiles, keys, np.arange(keys.size), tiles.lines().reshape(-1), keys.size)
+    return _pixels(reader, tiles, keys, np.arange(keys.size), tiles.places(), keys.size)
 
 
 def _scattered_pixels(reader: Reader, tiles: Tiles) -> Hits:
     """Hits of those pixels of microtiles that see something and that their facet owns."""
     keys = reader.canvas.keys.take(tiles.index, axis=0)
-    pixel, address, inside = _owned(reader, tiles, keys != 0)
-    return _pixels(reader, tiles, keys.reshape(-1).take(pixel), pixel, address, inside)
+    pixel, address, inside = _owned(reader.blocks, tiles, keys != 0)
+    keys = keys.reshape(-1).take(pixel)
+    return _pixels(reader, tiles, keys, pixel, Places(address, 1), inside)
 
 
-def _owned(reader: Reader, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, IntArray, int]:
+def _owned(blocks: Blocks, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, IntArray, int]:
     """Those of the `drawn` pixels (n, 64) of microtiles that their facet owns.
 
     Returns:
@@ -270,7 +302,7 @@ def _owned(reader: Reader, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, In
     """
     owned, inside = (
         np.unpackbits(bits.take(tiles.number, axis=0), axis=1).view(np.bool_)
-        for bits in (reader.blocks.owned, reader.blocks.inside)
+        for bits in (blocks.owned, blocks.inside)
     )
     drawn &= owned
     inside &= drawn
@@ -281,7 +313,7 @@ def _owned(reader: Reader, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, In
 
 
 def _pixels(
-    reader: Reader, tiles: Tiles, keys: IntArray, pixel: IntArray, first: IntArray, inside: int
+    reader: Reader, tiles: Tiles, keys: IntArray, pixel: IntArray, places: Places, inside: int
 ) -> Hits:
     """Hits of pixels of microtiles, each a group of its own.
 
@@ -290,7 +322,7 @@ def _pixels(
         tiles: n microtiles.
         keys: (G,) keys of the pixels.
         pixel: (G,) the pixels, counted through all microtiles, ascending.
-        first: addresses of the pixels, or of runs of them where they are all.
+        places: where they lie in the quilt.
         inside: pixels that are not bleed.
     """
     planes, wanted = reader.table.planes, reader.wanted
@@ -320,8 +352,7 @@ def _pixels(
         second, third, total = _values(seen.weights, at)
         weights = np.stack((second / total, third / total)).astype(np.float32)
     return Hits(
-        first=first,
-        run=RUN if first.size < keys.size else 1,
+        places=places,
         chosen=None,
         facet=tiles.facet.take(pixel >> 6),
         triangle=seen.triangle.take(which),

@@ -120,9 +120,7 @@ def _ours(
         contestants[f"{kind} frame 2"] = partial(frame, crew=pool)
         matte = _matte(stage)
         pool = ends.enter_context(Pool(matte, [buffers], 2))
-        contestants[f"{kind} matte 2"] = partial(
-            draw_frame, matte, viewer, buffers, dirty=dirty, crew=pool
-        )
+        contestants[f"{kind} matte 2"] = partial(draw_frame, matte, viewer, buffers, dirty=dirty, crew=pool)
     return contestants
 
 
