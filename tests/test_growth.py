@@ -16,6 +16,7 @@ from rig import display, icosphere, viewer
 from quiltcli import binframe, binning, draw, raster
 from quiltcli.display import Facets
 from quiltcli.draw import Stage, draw_frame, new_buffers
+from quiltcli.scene import Scene
 
 EYE = viewer((2.2, 1.8, 3.2))
 PIXELS = 400_000  # of all facets together, lit or not
@@ -28,8 +29,9 @@ PROBES = {
     (raster, "draw_large"): lambda evaluated, *_: {"large": evaluated},
     (draw, "block_window"): lambda pixels, buffer, *_: {"bytes": pixels.size * buffer.itemsize},
     (draw, "fill"): lambda _, buffers, channels, scene, eye, hits: {
-        "hits": hits.depth.size,
-        "bytes": hits.depth.size * sum(buffer.itemsize for buffer in buffers.values()),
+        "shaded": hits.depth.size,
+        "hits": hits.pixel.size,
+        "bytes": hits.pixel.size * sum(buffer.itemsize for buffer in buffers.values()),
     },
 }
 
@@ -121,7 +123,8 @@ def test_the_picture_is_stored_once_however_many_triangles_it_has():
 def test_pixels_and_bytes_are_linear_in_the_resolution():
     for what in ("hits", "bytes"):
         assert growth(by_pixels(), what) == pytest.approx([4, 4], rel=0.02)
-    assert max(growth(by_pixels(), "evaluated")) < 4.2
+    for what in ("evaluated", "shaded"):
+        assert max(growth(by_pixels(), what)) < 4.2
 
 
 def test_binning_does_not_depend_on_the_resolution():
@@ -170,6 +173,31 @@ def test_triangles_behind_others_are_hardly_looked_at():
     culling = stage.job.render.model_copy(update={"backface_culling": True})
     both, one = done(stage), done(replace(stage, job=stage.job.model_copy(update={"render": culling})))
     assert both["evaluated"] - one["evaluated"] < 0.5 * one["evaluated"]
+
+
+def before(scene: Scene, corners: list[tuple[float, float, float]]) -> Scene:
+    """The scene with one more triangle."""
+    count = len(scene.vertices)
+    return replace(
+        scene,
+        vertices=np.concatenate((scene.vertices, corners)),
+        triangles=np.concatenate((scene.triangles, np.array([[count, count + 1, count + 2]], np.int32))),
+        normals=np.concatenate((scene.normals, np.tile(np.float32([0, 0, 1]), (3, 1)))),
+        colors=np.ones((count + 3, 3), np.float32),
+        flat=np.append(scene.flat, True),
+        object=np.append(scene.object, np.int32(0)),
+        material=np.append(scene.material, np.int32(0)),
+    )
+
+
+def test_small_triangles_behind_a_large_one_are_not_looked_at():
+    ball = ball_scene(5, radius=0.3)
+    stage = stage_of_facets(lit_and_dark(0), ball)
+    behind = replace(stage, scene=before(ball, [(-1.5, -1, 0.5), (2.5, -1, 0.5), (0.3, 2.5, 0.5)]))
+    alone, hidden = done(stage), done(behind)
+    assert alone["small"] > 10_000
+    assert hidden["small"] == 0
+    assert hidden["hits"] > alone["hits"]
 
 
 def test_the_stages_that_benchmarks_time_are_those_of_a_frame():

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from wallscene import hits
 
 from quiltcli.channels import half_floats
-from quiltcli.raster.hits import RUN, Hits
+from quiltcli.raster.hits import RUN, Places
 from quiltcli.raster.vectors import (
     BASIS,
     PointVectors,
@@ -106,17 +108,32 @@ def test_runs_go_to_eight_neighbours_wherever_they_begin(kind):
     first = np.array([3, 40, 17, 92 - RUN])
     values = np.arange(32).reshape(2, 16)
     one = hits(np.zeros((3, 1)))
-    seen = Hits(**{**vars(one), "first": first, "run": RUN, "depth": np.zeros((2, 16))})
+    seen = replace(one, places=Places(first, RUN), depth=np.zeros((2, 16)))
     buffer = np.full(92, 99, kind)
     seen.put(buffer, values)
     expected = np.full(92, 99, kind)
-    expected[seen.pixel] = values
+    expected[seen.pixel] = values.reshape(-1)
     np.testing.assert_array_equal(buffer, expected)
     assert np.count_nonzero(buffer != 99) == 32
     seen.put(buffer, np.array([[5], [7]]))
-    np.testing.assert_array_equal(buffer[seen.pixel], np.repeat([[5], [7]], 16, axis=1))
+    np.testing.assert_array_equal(buffer[seen.pixel], np.repeat([5, 7], 16))
     seen.put(buffer, np.array([[1]]))
     assert (buffer[seen.pixel] == 1).all()
+
+
+def test_of_groups_only_the_chosen_pixels_are_drawn():
+    chosen = np.array([1, 15, 16, 30])
+    seen = replace(
+        hits(np.zeros((3, 2))), places=Places(chosen * 2, 1), chosen=chosen, depth=np.zeros((2, 16))
+    )
+    buffer = np.full(64, 99.0)
+    seen.put(buffer, np.arange(32).reshape(2, 16))
+    assert buffer[chosen * 2].tolist() == chosen.tolist()
+    assert np.count_nonzero(buffer != 99) == 4
+    seen.put(buffer, np.array([[5], [7]]))
+    assert buffer[chosen * 2].tolist() == [5, 5, 7, 7]
+    seen.put(buffer, np.array([[1]]))
+    assert (buffer[chosen * 2] == 1).all()
 
 
 def test_half_floats_are_the_nearest():

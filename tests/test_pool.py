@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballstage import ball_scene, stage_of_facets
-from rig import cube, viewer
+from rig import cube, display, icosphere, viewer
 from wallscene import lights
 
 from quiltcli import pool as pools
@@ -38,6 +38,24 @@ def test_workers_draw_the_same_pixels_as_one_process(stage):
             assert one.visible_pixels == other.visible_pixels > 1000
             for name in alone:
                 np.testing.assert_array_equal(alone[name], together[name], err_msg=name)
+
+
+@pytest.mark.parametrize("background", [(0, 0, 0), (0.1, 0, 0.2)])
+def test_a_frame_does_not_show_the_frames_before_it(background):
+    lamps = lights(sun=[(-1, -1, -1)], color=[(2, 2, 2)], ambient=(0.1, 0.1, 0.1))
+    vertices, triangles = icosphere(1)
+    facets = display(vertices, triangles.tolist(), 60)
+    stage = stage_of_facets(facets, ball_scene(2, 0.7, lamps, background), bleed=2)
+    fresh, used = new_buffers(stage), shared_buffers(stage)
+    dirty = np.zeros(stage.blocks.facet.size, bool)
+    with Pool(stage, [used], 2) as pool:
+        for eye in (*EYES, (2.0, 1.8, 3.2), (2.2, 1.7, 3.1)):
+            for crew in (pool, None):
+                record = draw_frame(stage, viewer(eye), used, dirty=dirty, crew=crew)
+                assert 1000 < record.visible_pixels < 0.9 * np.count_nonzero(stage.owners > 0)
+                draw_frame(stage, viewer(eye), fresh)
+                for name in fresh:
+                    np.testing.assert_array_equal(fresh[name], used[name], err_msg=name)
 
 
 def test_more_pairs_than_there_is_room_for_are_drawn_all_the_same(stage, monkeypatch):

@@ -244,3 +244,22 @@ def test_samples_look_beside_the_centre():
     right = drawn(points, [(0, 1, 2), (0, 2, 3)], sample=(0.4, 0.0))[32] >= 0
     assert np.flatnonzero(left).tolist() == list(range(11, 21))
     assert np.flatnonzero(right).tolist() == list(range(10, 20))
+
+
+def test_hits_and_missed_pixels_are_all_that_the_facets_own():
+    vertices, triangles = icosphere(1)
+    rng = np.random.default_rng(5)
+    for points, faces in (
+        (vertices * 0.6, triangles),
+        (rng.normal(size=(90, 3)) * 0.5, np.arange(90).reshape(-1, 3)),
+    ):
+        shown = picture(display(vertices, triangles.tolist(), 70), points, faces, viewer((2.2, 1.8, 3.2)))
+        count = np.zeros(shown.owners.size, int)
+        for batch in raster.batches(shown.frame):
+            drawing = raster.draw(shown.frame, batch)
+            block = np.arange(*batch)
+            for part in (*(h.places for h in drawing.hits(raster.Wanted())), *drawing.missed(block)):
+                np.add.at(count, part.pixel, 1)
+        facet = shown.frame.blocks.facet[np.diff(shown.frame.pairs.start) > 0]
+        np.testing.assert_array_equal(count, np.isin(np.abs(shown.owners), facet + 1))
+        assert np.count_nonzero((count > 0) & (shown.triangle < 0)) > 1000

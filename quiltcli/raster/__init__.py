@@ -28,7 +28,7 @@ from quiltcli.raster.blocks import (
 from quiltcli.raster.depth import DepthRange, triangles_in_range
 from quiltcli.raster.hits import Hits, Places, Wanted
 from quiltcli.raster.keys import serial_bits
-from quiltcli.raster.large import draw_large
+from quiltcli.raster.large import covering_keys, draw_large, large_spans
 from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import PlaneTable
 from quiltcli.raster.prewarp import (
@@ -153,7 +153,10 @@ def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.
     width, height = pairs.box[1] - pairs.box[0], pairs.box[3] - pairs.box[2]
     some = np.minimum(width, height) >= 0
     small = np.maximum(width, height) < LIMIT
-    draw_small(pairs, np.flatnonzero(some & small), table, canvas, limits, bits, by)
+    large = table.add(pairs, np.flatnonzero(some & ~small)).compact()
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
-    draw_large(table.add(pairs, np.flatnonzero(some & ~small)).compact(), canvas, limits, bits, by)
+    spans = large_spans(large, canvas, by)
+    covering = covering_keys(large, spans, canvas, bits)
+    draw_small(pairs, np.flatnonzero(some & small), table, canvas, limits, bits, by, covering)
+    draw_large(large, spans, covering, canvas, limits, bits, by)
     return Drawing(frame.blocks, canvas, table, limits, bits)

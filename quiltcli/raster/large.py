@@ -73,13 +73,40 @@ class Spans:
         return Spans(*(column.take(keep) for column in vars(self).values()))
 
 
+def large_spans(planes: Planes, canvas: Canvas, by: BatchOrder | None = None) -> Spans:
+    """The microtiles that pairs of any size may show in.
+
+    Args:
+        planes: the pairs.
+        canvas: the microtiles.
+        by: what to order by instead of 1/t; tiles of pairs that lie behind others are not left out then.
+    """
+    return _spans(planes, _pieces(planes, by is None), canvas)
+
+
+def covering_keys(planes: Planes, spans: Spans, canvas: Canvas, bits: int) -> IntArray:
+    """Keys (M,) that every pixel of a microtile will have at least, for a pair covers it; 0 for none."""
+    nearest = np.zeros(canvas.touched.size)
+    covers = np.flatnonzero((spans.crossed == 0) & ~planes.cut.take(spans.row))
+    np.maximum.at(nearest, spans.tile[covers], spans.least[covers])
+    return nearest.view(np.int64) & ~np.int64((1 << bits) - 1)
+
+
 def draw_large(
-    planes: Planes, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None = None
+    planes: Planes,
+    spans: Spans,
+    covering: IntArray,
+    canvas: Canvas,
+    limits: DepthRange,
+    bits: int,
+    by: BatchOrder | None = None,
 ) -> int:
     """Draw pairs of any size.
 
     Args:
         planes: the pairs.
+        spans: from `large_spans`.
+        covering: from `covering_keys`.
         canvas: what smaller pairs have left; its keys are raised, and microtiles that one pair fills noted.
         limits: near and far, for pairs that reach beyond them.
         bits: bits of the serial in a key.
@@ -88,9 +115,9 @@ def draw_large(
     Returns:
         Number of pixels that were evaluated.
     """
-    spans = _spans(planes, _pieces(planes, by is None), canvas)
     if by is None:
-        spans = _visible(planes, spans, canvas, bits)
+        nearest = depth_part(np.maximum(least_keys(canvas), covering), bits)
+        spans = spans.take(np.flatnonzero(spans.greatest >= nearest.take(spans.tile)))
         spans = _fill(planes, spans, canvas)
     _draw_rounds(planes, spans, canvas, limits, bits, by)
     return spans.row.size * MICROTILE * MICROTILE
@@ -245,14 +272,6 @@ def _corner_values(
     down = np.minimum(reach_x, 0) + np.minimum(reach_y, 0)
     up = np.maximum(reach_x, 0) + np.maximum(reach_y, 0)
     return values, down, up
-
-
-def _visible(planes: Planes, spans: Spans, canvas: Canvas, bits: int) -> Spans:
-    """Without the spans that lie wholly behind what covers their microtile."""
-    nearest = depth_part(least_keys(canvas), bits)
-    covers = np.flatnonzero((spans.crossed == 0) & ~planes.cut.take(spans.row))
-    np.maximum.at(nearest, spans.tile[covers], spans.least[covers])
-    return spans.take(np.flatnonzero(spans.greatest >= nearest.take(spans.tile)))
 
 
 def _fill(planes: Planes, spans: Spans, canvas: Canvas) -> Spans:

@@ -25,6 +25,7 @@ LIMIT = SIZES[-1]
 _RUN = 1 << 15
 _CANDIDATES = 1 << 16
 _SHAPES = len(SIZES) ** 2
+_SOME = 8  # of so many microtiles one has to be covered for a look at all pairs to be worth its time
 _CLASS_OF = np.searchsorted(np.asarray(SIZES), np.arange(LIMIT + 1)).astype(np.uint16)
 
 
@@ -61,6 +62,7 @@ def draw_small(
     limits: DepthRange,
     bits: int,
     by: BatchOrder | None = None,
+    covering: IntArray | None = None,
 ) -> int:
     """Draw pairs whose boxes are at most LIMIT pixels wide and high.
 
@@ -72,10 +74,13 @@ def draw_small(
         limits: near and far, for pairs that reach beyond them.
         bits: bits of the serial in a key.
         by: what to order by instead of 1/t.
+        covering: (M,) keys that every pixel of a microtile will have at least; pairs behind are left out.
 
     Returns:
         Number of candidate pixels that were evaluated.
     """
+    if covering is not None and by is None and np.count_nonzero(covering) * _SOME > covering.size:
+        rows = rows[~_hidden(pairs, rows, covering, canvas, bits)]
     classes = size_classes(pairs, rows)
     behind = seen_from_behind(pairs.corners, limits.handed.take(pairs.block)).take(rows)
     order = np.argsort(classes + behind * np.uint16(2 * _SHAPES), kind="stable")

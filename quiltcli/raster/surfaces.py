@@ -26,8 +26,6 @@ class Surfaces:
 
     Attributes:
         triangle: (n,) triangle index.
-        bounds: (2, n) least and greatest 1/t.
-        inverse: (3, n) plane of 1/t.
         normal: (3, 3, n) planes of the normal [axis, coefficient] on the side of the eye, of any length;
             none unless wanted, (0, 3, n).
         weights: (3, 3, n) planes of the second and third edge function and of the sum of all; none
@@ -35,8 +33,6 @@ class Surfaces:
     """
 
     triangle: Int32Array
-    bounds: FloatArray
-    inverse: FloatArray
     normal: Float32Array
     weights: FloatArray
 
@@ -68,8 +64,6 @@ def surfaces(
             weights = edge[[1, 2, 0]]
     return Surfaces(
         triangle=triangle,
-        bounds=np.stack((planes.low.take(rows), planes.high.take(rows))),
-        inverse=_moved(np.take(planes.inverse, rows, axis=1), x, y),
         normal=normal,
         weights=weights,
     )

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, segments
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.hits import RUN, Hits, Places, Wanted
 from quiltcli.raster.keys import serial_of
-from quiltcli.raster.planes import PlaneTable
-from quiltcli.raster.surfaces import Surfaces, has_one_normal, one_normal, surfaces
+from quiltcli.raster.planes import Planes, PlaneTable
+from quiltcli.raster.surfaces import has_one_normal, one_normal, surfaces
 from quiltcli.raster.vectors import (
     BASIS,
     PointVectors,
@@ -32,7 +32,7 @@ from quiltcli.raster.vectors import (
 
 _WHOLE, _PIXELS = 2048, 512  # microtiles at a time
 _MANY = 512  # microtiles of one triangle that are worth a part of their own
-_DX, _DY = BASIS[0].astype(np.int64), BASIS[1].astype(np.int64)
+_DX, _DY = BASIS[0].astype(np.float32), BASIS[1].astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool)
     seen = surfaces(planes, rows, wanted, handed, tiles.x, tiles.y)
     if wanted.normals is not None:
         normal = TileVectors(seen.normal.astype(np.float64))
-    inverse = exact_values(seen.inverse)
+    inverse = exact_values(tiles.local(np.take(planes.inverse, rows, axis=1)))
     ray, depth, position = _rays(reader, tiles)
     depth /= inverse
     weights = None
@@ -330,73 +330,94 @@ def _pixels(
     rows = reader.table.row_of_serial.take(serial)
     x0, y0 = (planes.box[k].take(rows) for k in (0, 2))
     seen = surfaces(planes, rows, wanted, reader.limits.handed, x0, y0)
-    place = np.stack((x0, y0))
-    place = np.ascontiguousarray(place.T).take(which, axis=0)
     complete = pixel.size == tiles.x.size * 64
 
     def chosen(values: NDArray[Any]) -> NDArray[Any]:
-        """Of values (..., n, 64) those of the pixels, (..., G, 1)."""
-        values = values.reshape(*values.shape[:-2], -1, 1)
-        return values if complete else values.take(pixel, axis=-2)
+        """Of values (..., n, 64) those of the pixels, (..., G)."""
+        values = values.reshape(*values.shape[:-2], -1)
+        return values if complete else values.take(pixel, axis=-1)
 
-    x = chosen(tiles.x[:, None] + _DX)[:, 0] - place[:, 0]
-    y = chosen(tiles.y[:, None] + _DY)[:, 0] - place[:, 1]
-    at = _At(which, x.astype(np.float64), y.astype(np.float64))
-    inverse = _inverse(seen, at)
+    x, y = (
+        chosen(tiles.x.astype(np.float32)[:, None] + _DX),
+        chosen(tiles.y.astype(np.float32)[:, None] + _DY),
+    )
+    inverse = _inverse(planes, rows, which, x.astype(np.float64), y.astype(np.float64))[:, None]
     ray, depth, position = _rays(reader, tiles)
     normal = weights = None
     if wanted.normals is not None:
-        single = _At(which, x.astype(np.float32), y.astype(np.float32))
-        normal = PointVectors(_values(seen.normal, single))
+        normal = PointVectors(_values(seen.normal, which, x, y, x0, y0))
     if wanted.weights:
-        second, third, total = _values(seen.weights, at)
+        second, third, total = _values(seen.weights, which, x, y, x0, y0)
         weights = np.stack((second / total, third / total)).astype(np.float32)
     return Hits(
         places=places,
         chosen=None,
-        facet=tiles.facet.take(pixel >> 6),
+        facet=chosen(np.broadcast_to(tiles.facet[:, None], (tiles.facet.size, 64))),
         triangle=seen.triangle.take(which),
-        ray=PointVectors(chosen(vector_values(ray))),
-        depth=chosen(depth) / inverse,
+        ray=PointVectors(chosen(vector_values(ray))[:, :, None]),
+        depth=chosen(depth)[:, None] / inverse,
         normal=normal,
         weights=weights,
-        position=None if position is None else chosen(position) / inverse,
+        position=None if position is None else chosen(position)[:, :, None] / inverse,
         inside=inside,
     )
 
 
-@dataclass(frozen=True)
-class _At:
-    """G pixels: which surface each sees, and columns and rows from where the surface's planes begin."""
+def _inverse(planes: Planes, rows: IntArray, which: IntArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """1/t (G,), held between the least and the greatest of the triangle's corners.
 
-    which: IntArray
-    x: NDArray[Any]
-    y: NDArray[Any]
-
-
-def _inverse(seen: Surfaces, at: _At) -> FloatArray:
-    """1/t (G, 1), held between the least and the greatest of the triangle's corners."""
-    rows = np.concatenate((seen.inverse, seen.bounds)).T.copy().take(at.which, axis=0)
-    result = _plane_values(rows, at, np.empty(len(rows)))
-    np.maximum(result, rows[:, 3], out=result)
-    np.minimum(result, rows[:, 4], out=result)
-    return result[:, None]
-
-
-def _values(planes: NDArray[Any], at: _At) -> NDArray[Any]:
-    """Values (n, G, 1) of n planes (n, 3, S) of surfaces."""
-    # One look-up of a row takes as long as one of a single number.
-    rows = planes.reshape(3 * len(planes), planes.shape[2]).T.copy().take(at.which, axis=0)
-    result = np.empty((len(planes), len(rows), 1), dtype=planes.dtype)
-    for k in range(len(planes)):
-        _plane_values(rows[:, 3 * k :], at, result[k, :, 0])
+    Args:
+        planes: the planes of a batch.
+        rows: (S,) the pairs that are seen.
+        which: (G,) which of them each pixel sees.
+        x: (G,) columns in the block.
+        y: (G,) rows.
+    """
+    table = np.empty((rows.size, 5))
+    for k, column in enumerate((*planes.inverse, planes.low, planes.high)):
+        table[:, k] = column.take(rows)
+    table = table.take(which, axis=0)
+    result = _plane_values(table, x, y, np.empty(x.size))
+    np.maximum(result, table[:, 3], out=result)
+    np.minimum(result, table[:, 4], out=result)
     return result
 
 
-def _plane_values(rows: NDArray[Any], at: _At, result: NDArray[Any]) -> NDArray[Any]:
+def _values(
+    planes: NDArray[Any],
+    which: IntArray,
+    x: Float32Array,
+    y: Float32Array,
+    x0: Int32Array,
+    y0: Int32Array,
+) -> NDArray[Any]:
+    """Values (n, G, 1) of n planes (n, 3, S) of surfaces.
+
+    Args:
+        planes: the planes, from places of their own.
+        which: (G,) which surface each pixel sees.
+        x: (G,) columns in the block.
+        y: (G,) rows.
+        x0: (S,) columns at which the planes begin.
+        y0: (S,) rows.
+    """
+    # One look-up of a row takes as long as one of a single number.
+    count = 3 * len(planes)
+    table = np.empty((x0.size, count + 2), dtype=planes.dtype)
+    table[:, :count] = planes.reshape(count, -1).T
+    table[:, count], table[:, count + 1] = x0, y0
+    table = table.take(which, axis=0)
+    x, y = x - table[:, count], y - table[:, count + 1]
+    result = np.empty((len(planes), which.size, 1), dtype=planes.dtype)
+    for k in range(len(planes)):
+        _plane_values(table[:, 3 * k :], x, y, result[k, :, 0])
+    return result
+
+
+def _plane_values(rows: NDArray[Any], x: NDArray[Any], y: NDArray[Any], result: NDArray[Any]) -> NDArray[Any]:
     """Put into `result` (G,) the values of planes given in rows (G, 3 or more)."""
-    np.multiply(rows[:, 0], at.x, out=result)
-    result += rows[:, 1] * at.y
+    np.multiply(rows[:, 0], x, out=result)
+    result += rows[:, 1] * y
     result += rows[:, 2]
     return result
 
