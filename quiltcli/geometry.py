@@ -97,7 +97,7 @@ def segments(start: IntArray) -> tuple[IntArray, IntArray]:
     """
     counts = np.diff(start)
     row = np.repeat(np.arange(counts.size), counts)
-    return row, np.arange(start[-1]) - np.repeat(start[:-1], counts)
+    return row, np.arange(start[-1]) - start.take(row)
 
 
 def next_in_row(start: IntArray) -> IntArray:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rig import CUBE, CUBE_FACES, bin_triangles, cube, display, icosphere, panel, viewer
 
 from quiltcli.binning import Cores, cones, facet_parts, lit_cones
-from quiltcli.binning.broad import candidate_pairs, cube_faces
+from quiltcli.binning.broad import ConeGrids, candidate_pairs, cube_faces
 from quiltcli.binning.cones import cone_planes, overlapping
 from quiltcli.binning.cores import facet_cores
 from quiltcli.display import lit_facets
@@ -223,7 +223,7 @@ def test_the_broad_phase_keeps_all_that_overlaps(seed):
     meets = overlapping(polygons, cone_planes(targets), targets, first, second)
     middle = targets.mean(axis=1)[second]
     meets &= (np.einsum("nkc,nc->nk", polygons[first], middle) > 0).all(axis=1)
-    found = set(zip(*(i.tolist() for i in candidate_pairs(polygons, targets)), strict=True))
+    found = set(zip(*(i.tolist() for i in candidate_pairs(polygons, ConeGrids(targets))), strict=True))
     assert set(zip(first[meets].tolist(), second[meets].tolist(), strict=True)) - found == set()
 
 

@@ -111,7 +111,7 @@ def _second_pass(
     for at in range(0, rest.size, _CHUNK):
         chunk = rest[at : at + _CHUNK]
         corners = vertices[triangles[chunk]]
-        first, second = candidate_pairs(corners, cones.wide)
+        first, second = candidate_pairs(corners, cones.grids)
         meets = overlapping(corners, cones.planes, cones.wide, first, second)
         yield _key(cones.facet[second[meets]], chunk[first[meets]])
 

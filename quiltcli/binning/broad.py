@@ -9,6 +9,7 @@ candidates only cost time, the exact test follows.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -51,37 +52,53 @@ def cube_faces(towards: FloatArray) -> FloatArray:
     return np.stack(frames)
 
 
-def candidate_pairs(polygons: FloatArray, cones: FloatArray) -> tuple[IntArray, IntArray]:
+class ConeGrids:
+    """Cones as rectangles on the faces of a cube about the eye, and grids in which they are found.
+
+    Attributes:
+        count: number of cones.
+        faces: frame (3, 3) and grid of every face that cones are seen through.
+    """
+
+    def __init__(self, cones: FloatArray) -> None:
+        """Sort in the cones (K, m, 3), given by corners minus the eye."""
+        self.count = len(cones)
+        self.faces: list[tuple[FloatArray, _Grid]] = []
+        if not len(cones):
+            return
+        middle = normalized(cones).reshape(-1, 3).mean(axis=0)
+        if not middle.any():  # facets all around the eye: any direction will do
+            middle[2] = -1.0
+        for frame in cube_faces(middle):
+            targets = footprints(cones, frame)
+            if targets.index.size:
+                self.faces.append((frame, _Grid(targets)))
+
+
+def candidate_pairs(polygons: FloatArray, cones: ConeGrids) -> tuple[IntArray, IntArray]:
     """Pairs of polygons and cones that may overlap.
 
     Args:
         polygons: (N, n, 3) corners minus the eye.
-        cones: (K, m, 3) corners minus the eye.
+        cones: the cones.
 
     Returns:
         Indices of polygons and of cones, every pair once.
     """
     keys: list[IntArray] = []
-    if len(polygons) and len(cones):
-        middle = normalized(cones).reshape(-1, 3).mean(axis=0)
-        if not middle.any():  # facets all around the eye: any direction will do
-            middle[2] = -1.0
-        for frame in cube_faces(middle):
-            found = _on_face(polygons, cones, frame)
+    if len(polygons):
+        for frame, grid in cones.faces:
+            found = _on_face(polygons, frame, grid, cones.count)
             if found.size:
                 keys.append(found)
     if not keys:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     found = keys[0] if len(keys) == 1 else np.unique(np.concatenate(keys))
-    return np.divmod(found, max(len(cones), 1))
+    return np.divmod(found, max(cones.count, 1))
 
 
-def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> IntArray:
-    """Keys polygon·K + cone of the pairs whose rectangles meet on one face."""
-    targets = footprints(cones, frame)
-    if not targets.index.size:
-        return np.zeros(0, dtype=np.int64)
-    grid = _Grid(targets)
+def _on_face(polygons: FloatArray, frame: FloatArray, grid: _Grid, count: int) -> IntArray:
+    """Keys polygon·`count` + cone of the pairs whose rectangles meet on one face."""
     movers = grid.within(footprints(polygons, frame))
     result = []
     cells = grid.cells(movers)
@@ -92,7 +109,7 @@ def _on_face(polygons: FloatArray, cones: FloatArray, frame: FloatArray) -> IntA
         last = max(int(np.searchsorted(work, done + _CHUNK // 8, side="right")), first + 1)
         part = np.arange(first, last)
         mover, target = grid.meeting(movers.take(part), cells[:, first:last])
-        result.append(movers.index[first + mover] * len(cones) + targets.index[target])
+        result.append(movers.index[first + mover] * count + grid.targets.index[target])
         first = last
     return np.concatenate(result) if result else np.zeros(0, dtype=np.int64)
 
@@ -107,8 +124,7 @@ def footprints(polygons: FloatArray, frame: FloatArray) -> Footprints:
     front = (w > _NEAR_PLANE * (np.abs(x) + np.abs(y) + np.abs(w))).all(axis=0)
     safe = np.where(front, w, 1.0)
     x, y = x / safe, y / safe
-    low = np.stack((x.min(axis=0), y.min(axis=0)))
-    high = np.stack((x.max(axis=0), y.max(axis=0)))
+    low, high = (np.stack([reduce(extreme, axis) for axis in (x, y)]) for extreme in (np.minimum, np.maximum))
     low[:, ~front], high[:, ~front] = -1.0, 1.0
     seen = np.flatnonzero((low[0] <= 1) & (low[1] <= 1) & (high[0] >= -1) & (high[1] >= -1))
     prints = Footprints(index, low, high).take(seen)

@@ -9,9 +9,11 @@ covers the rounding of the tests.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from quiltcli.binning.broad import ConeGrids
 from quiltcli.display import Facets, convex_parts
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot
 from quiltcli.layout import Layout
@@ -19,6 +21,7 @@ from quiltcli.layout import Layout
 _LONGEST_MITRE = 4.0
 _FEW = 4
 _MANY = 1 << 16
+_AT_ONCE = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,11 @@ class Cones:
     corners: FloatArray
     wide: FloatArray
     planes: FloatArray
+
+    @cached_property
+    def grids(self) -> ConeGrids:
+        """The grown parts, sorted in for the broad phase."""
+        return ConeGrids(self.wide)
 
 
 def facet_parts(facets: Facets, layout: Layout, bleed: int) -> Parts:
@@ -196,12 +204,18 @@ def _within(
         of_corners: (N,) index into `corners`.
         alive: pairs to look at.
     """
-    columns = np.ascontiguousarray(corners.transpose(1, 2, 0))
-    for edge in np.ascontiguousarray(planes.transpose(1, 2, 0)):
-        nx, ny, nz = edge[:, of_planes[alive]]
-        outside = np.ones(alive.size, dtype=np.bool_)
-        for x, y, z in columns:
-            at = of_corners[alive]
-            outside &= nx * x[at] + ny * y[at] + nz * z[at] < 0
-        alive = alive[~outside]
-    return alive
+    corners = np.ascontiguousarray(corners.transpose(1, 2, 0))
+    planes = np.ascontiguousarray(planes.transpose(1, 2, 0))
+    found = []
+    for at in range(0, alive.size, _AT_ONCE):
+        part = alive[at : at + _AT_ONCE]
+        plane_of, points = of_planes.take(part), np.take(corners, of_corners.take(part), axis=2)
+        inside = np.ones(part.size, dtype=np.bool_)
+        for edge in planes:
+            nx, ny, nz = np.take(edge, plane_of, axis=1)
+            outside = np.ones(part.size, dtype=np.bool_)
+            for x, y, z in points:
+                outside &= nx * x + ny * y + nz * z < 0
+            inside &= ~outside
+        found.append(part[inside])
+    return np.concatenate(found) if found else alive

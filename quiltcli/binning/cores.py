@@ -50,7 +50,7 @@ def facet_cores(cones: Cones) -> tuple[FloatArray, IntArray]:
 
 def _conflicts(cones: Cones) -> tuple[IntArray, IntArray]:
     """Parts and the parts of other facets whose grown cones meet them, ordered by part."""
-    first, second = candidate_pairs(cones.corners, cones.wide)
+    first, second = candidate_pairs(cones.corners, cones.grids)
     other = cones.facet[first] != cones.facet[second]
     first, second = first[other], second[other]
     meets = overlapping(cones.corners, cones.planes, cones.wide, first, second)
