@@ -22,6 +22,7 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (binframe, "block_keys", "prewarp"),
     (raster, "warp", "prewarp"),
     (raster, "draw_small", "small triangles"),
+    (raster, "large_spans", "large triangles"),
     (raster, "draw_large", "large triangles"),
     (raster, "read_canvas", "visibility"),
     (channels, "shade", "shade"),
