@@ -31,55 +31,75 @@ def facet_cores(cones: Cones) -> tuple[FloatArray, IntArray]:
     """
     corners = cones.corners
     counts = np.full(cones.facet.size, corners.shape[1])
-    part, other = _conflicts(cones)
-    start = np.searchsorted(part, np.arange(cones.facet.size + 1))
-    _, rank = segments(start)
+    part, plane = _dividing_planes(cones, *_conflicts(cones))
+    _, rank = segments(np.searchsorted(part, np.arange(cones.facet.size + 1)))
     for turn in range(int(rank.max(initial=-1)) + 1):
         now = np.flatnonzero(rank == turn)
-        plane = _dividing_planes(cones, part[now], other[now])
-        clipped, left = _clip(corners[part[now]], counts[part[now]], plane)
+        mine = part[now]
+        side = _sides(corners[mine], plane[now])
+        cut = (side <= 0).any(axis=1)
+        if not cut.any():
+            continue
+        mine = mine[cut]
+        clipped, left = _clip(corners[mine], counts[mine], side[cut])
         wider = clipped.shape[1] - corners.shape[1]
         if wider > 0:
             corners = np.concatenate((corners, np.repeat(corners[:, -1:], wider, axis=1)), axis=1)
         corners = corners.copy()
-        corners[part[now], : clipped.shape[1]] = clipped
-        corners[part[now], clipped.shape[1] :] = clipped[:, -1:]
-        counts[part[now]] = left
+        corners[mine, : clipped.shape[1]] = clipped
+        corners[mine, clipped.shape[1] :] = clipped[:, -1:]
+        counts[mine] = left
     return corners, counts
 
 
 def _conflicts(cones: Cones) -> tuple[IntArray, IntArray]:
-    """Parts and the parts of other facets whose grown cones meet them, ordered by part."""
+    """Parts and the parts of other facets whose grown cones meet them."""
     first, second = candidate_pairs(cones.corners, cones.grids)
     other = cones.facet[first] != cones.facet[second]
     first, second = first[other], second[other]
     meets = overlapping(cones.corners, cones.planes, cones.wide, first, second)
-    first, second = first[meets], second[meets]
-    order = np.lexsort((second, first))
-    return first[order], second[order]
+    return first[meets], second[meets]
 
 
-def _dividing_planes(cones: Cones, part: IntArray, other: IntArray) -> FloatArray:
-    """Planes (N, 3), positive on the side kept: the edge of `other` that leaves most of `part`."""
-    centre = cones.corners[part].mean(axis=1)
+def _dividing_planes(cones: Cones, part: IntArray, other: IntArray) -> tuple[IntArray, FloatArray]:
+    """Planes that divide parts from others, by part; those that cut away most come first.
+
+    Args:
+        cones: the lit parts.
+        part: (N,) parts.
+        other: (N,) parts that meet them.
+
+    Returns:
+        the parts (N,), and planes (N, 3), positive on the side that is kept: of each `other` the edge
+        that leaves most.
+    """
+    centre = cones.corners.mean(axis=1)
     centre /= np.sqrt(dot(centre, centre))[:, None]
     planes = cones.planes[other]
-    outside = -dot(planes, centre[:, None, :])
+    outside = -dot(planes, centre[part][:, None, :])
     outside[~planes.any(axis=2)] = -np.inf
     best = outside.argmax(axis=1)
-    result: FloatArray = -planes[np.arange(part.size), best]
+    row = np.arange(part.size)
+    order = np.lexsort((other, outside[row, best], part))
+    return part[order], -planes[row, best][order]
+
+
+def _sides(polygons: FloatArray, planes: FloatArray) -> FloatArray:
+    """How far the corners (N, n) of polygons (N, n, 3) lie beyond the margin of one plane (N, 3) each."""
+    length = np.sqrt(dot(polygons, polygons))
+    result: FloatArray = dot(polygons, planes[:, None, :]) - _MARGIN * length
     return result
 
 
-def _clip(polygons: FloatArray, counts: IntArray, planes: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Clip convex polygons (N, n, 3) with `counts` corners by one plane each (Sutherland & Hodgman).
+def _clip(polygons: FloatArray, counts: IntArray, side: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Clip convex polygons (N, n, 3) with `counts` corners where `side` (N, n) is 0 or less.
+
+    The way of Sutherland & Hodgman.
 
     Returns:
         polygons (N, m, 3), short ones repeating their last corner, and their corner counts (N,);
         fewer than three corners are none.
     """
-    length = np.sqrt(dot(polygons, polygons))
-    side = dot(polygons, planes[:, None, :]) - _MARGIN * length
     ahead_of = np.roll(np.arange(polygons.shape[1]), -1)
     valid = np.arange(polygons.shape[1]) < counts[:, None]
     ahead = np.where(np.arange(polygons.shape[1]) == counts[:, None] - 1, 0, ahead_of)
