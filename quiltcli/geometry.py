@@ -86,6 +86,12 @@ def facet_from_world(origin: FloatArray, du: FloatArray, dv: FloatArray) -> Floa
     return maps
 
 
+def gather_corners(vertices: FloatArray, triangles: Int32Array) -> FloatArray:
+    """Corners (3, 3, N) [corner, axis] of `triangles` (N, 3), contiguous along N."""
+    rows = vertices.take(triangles.T.ravel(), axis=0).reshape(3, -1, 3)
+    return np.ascontiguousarray(rows.transpose(0, 2, 1))
+
+
 def segments(start: IntArray) -> tuple[IntArray, IntArray]:
     """Owner and offset of every element of a ragged array.
 

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig import CUBE, CUBE_FACES, bin_triangles, cube, display, icosphere, panel, viewer
 
-from quiltcli.binning import Cores, cones, facet_parts, lit_cones
+from quiltcli import binning
+from quiltcli.binning import Cores, facet_parts, lit_cones
 from quiltcli.binning.broad import ConeGrids, candidate_pairs, cube_faces
-from quiltcli.binning.cones import cone_planes, overlapping
+from quiltcli.binning.cones import by_corner, cone_planes, overlapping
 from quiltcli.binning.cores import facet_cores
 from quiltcli.display import lit_facets
 from quiltcli.geometry import dot
@@ -83,7 +84,7 @@ class Binned:
         """Every pair that the exact test of all triangles against all cones finds."""
         corners = self.vertices[self.triangles]
         first, second = (g.ravel() for g in np.mgrid[: len(corners), : len(self.cones.facet)])
-        meets = overlapping(corners, self.cones.planes, self.cones.wide, first, second)
+        meets = overlapping(by_corner(corners), self.cones.planes, self.cones.wide, first, second)
         return set(zip(first[meets].tolist(), self.cones.facet[second[meets]].tolist(), strict=True))
 
     def ahead(self):
@@ -139,7 +140,7 @@ def test_pairs_come_by_facet_then_triangle_and_once():
 
 def test_among_very_many_pairs_small_triangles_are_kept_with_little_waste(monkeypatch):
     exact = Binned(*CASES["sphere"], 5)
-    monkeypatch.setattr(cones, "_MANY", 0)
+    monkeypatch.setattr(binning, "_MANY", 0)
     quick = Binned(*CASES["sphere"], 5)
     assert exact.keys() < quick.keys()
     assert quick.pairs.facet.size <= 1.02 * exact.pairs.facet.size
@@ -203,7 +204,7 @@ def test_the_cone_test_agrees_with_a_search_for_a_common_direction(seed):
     rng = np.random.default_rng(seed)
     first, second = rng.normal(size=(2, 1, 3, 3)) + rng.normal(size=(2, 1, 1, 3)) * 2
     one = cone_planes(second)
-    meets = bool(overlapping(first, one, second, np.zeros(1, int), np.zeros(1, int))[0])
+    meets = bool(overlapping(by_corner(first), one, second, np.zeros(1, int), np.zeros(1, int))[0])
     weights = np.random.default_rng(0).dirichlet((1, 1, 1), 4000)
     inside = (weights @ first[0] @ one[0].T > 1e-9).all(axis=1).any()
     other = cone_planes(first)
@@ -220,10 +221,12 @@ def test_the_broad_phase_keeps_all_that_overlaps(seed):
     )
     targets = rng.normal(size=(40, 1, 3)) * 2 + 0.4 * rng.normal(size=(40, 3, 3))
     first, second = (g.ravel() for g in np.mgrid[:60, :40])
-    meets = overlapping(polygons, cone_planes(targets), targets, first, second)
+    meets = overlapping(by_corner(polygons), cone_planes(targets), targets, first, second)
     middle = targets.mean(axis=1)[second]
     meets &= (np.einsum("nkc,nc->nk", polygons[first], middle) > 0).all(axis=1)
-    found = set(zip(*(i.tolist() for i in candidate_pairs(polygons, ConeGrids(targets))), strict=True))
+    found = set(
+        zip(*(i.tolist() for i in candidate_pairs(by_corner(polygons), ConeGrids(targets))), strict=True)
+    )
     assert set(zip(first[meets].tolist(), second[meets].tolist(), strict=True)) - found == set()
 
 

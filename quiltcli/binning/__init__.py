@@ -16,7 +16,7 @@ import numpy as np
 from quiltcli.binning.broad import candidate_pairs
 from quiltcli.binning.cones import Cones, Parts, facet_parts, lit_cones, overlapping
 from quiltcli.binning.cores import facet_cores
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, gather_corners, segments
 
 __all__ = [
     "Cones",
@@ -29,6 +29,8 @@ __all__ = [
 ]
 
 _CHUNK = 1 << 17
+_FEW = 4
+_MANY = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -60,21 +62,26 @@ def pairs_of(
         core: (V,) the cores that the vertices' rays meet, by `Cores.met_by`.
         cones: of the lit parts of the display, as this eye sees them.
     """
-    a, b, c = core.take(triangles.take(drawn, axis=0).T)
+    corner = triangles if drawn.size == len(triangles) else triangles.take(drawn, axis=0)
+    a, b, c = (core.take(corner[:, k]) for k in range(3))
     same = (a == b) & (b == c) & (a >= 0)
     settled, rest = np.flatnonzero(same), np.flatnonzero(~same)
-    second = list(_second_pass(vertices, triangles, drawn[rest], cones))
-    found = np.concatenate([_key(cones.facet.take(a[settled]), drawn[settled]), *second])
+    # Of very many, a triangle with few candidates is small: its own edges would reject next to nothing.
+    few = _FEW if len(triangles) > _MANY else 0
+    keys = [_key(cones.facet.take(a[settled]), drawn[settled])]
+    reached = np.zeros(len(triangles), dtype=np.bool_)
+    for triangle, part in _second_pass(vertices, triangles, drawn[rest], cones, few):
+        keys.append(_key(cones.facet.take(part), triangle))
+        reached[triangle] = True
+    found = np.concatenate(keys)
     found.sort()
-    found = found[np.diff(found, prepend=-1) != 0]
-    triangle = found & 0xFFFFFFFF
-    reaching = np.zeros(int(drawn.max(initial=-1)) + 1, dtype=np.bool_)
-    reaching[triangle] = True
+    if cones.facet.size > np.unique(cones.facet).size:  # a facet of several parts may meet with more than one
+        found = found[np.diff(found, prepend=-1) != 0]
     return Pairs(
         facet=(found >> 32).astype(np.int32),
-        triangle=triangle.astype(np.int32),
+        triangle=(found & 0xFFFFFFFF).astype(np.int32),
         settled=settled.size,
-        reaching=int(np.count_nonzero(reaching)),
+        reaching=settled.size + int(np.count_nonzero(reached)),
     )
 
 
@@ -105,15 +112,15 @@ class Cores:
 
 
 def _second_pass(
-    vertices: FloatArray, triangles: Int32Array, rest: IntArray, cones: Cones
-) -> Iterator[IntArray]:
-    """Keys of the pairs of the triangles that the first pass left, by the exact cone test."""
+    vertices: FloatArray, triangles: Int32Array, rest: IntArray, cones: Cones, few: int
+) -> Iterator[tuple[IntArray, IntArray]]:
+    """Triangles and parts that the exact cone test finds for those the first pass left."""
     for at in range(0, rest.size, _CHUNK):
         chunk = rest[at : at + _CHUNK]
-        corners = vertices[triangles[chunk]]
+        corners = gather_corners(vertices, triangles.take(chunk, axis=0))
         first, second = candidate_pairs(corners, cones.grids)
-        meets = overlapping(corners, cones.planes, cones.wide, first, second)
-        yield _key(cones.facet[second[meets]], chunk[first[meets]])
+        meets = overlapping(corners, cones.planes, cones.wide, first, second, few)
+        yield chunk.take(first[meets]), second[meets]
 
 
 def _key(facet: Int32Array, triangle: IntArray) -> IntArray:

@@ -34,7 +34,9 @@ class Footprints:
     high: FloatArray
 
     def take(self, keep: IntArray) -> Footprints:
-        """The rectangles with these indices."""
+        """The rectangles with these indices, ascending."""
+        if keep.size == self.index.size:
+            return self
         return Footprints(self.index.take(keep), self.low.take(keep, axis=1), self.high.take(keep, axis=1))
 
 
@@ -66,11 +68,12 @@ class ConeGrids:
         self.faces: list[tuple[FloatArray, _Grid]] = []
         if not len(cones):
             return
+        columns = np.ascontiguousarray(cones.transpose(1, 2, 0))
         middle = normalized(cones).reshape(-1, 3).mean(axis=0)
         if not middle.any():  # facets all around the eye: any direction will do
             middle[2] = -1.0
         for frame in cube_faces(middle):
-            targets = footprints(cones, frame)
+            targets = footprints(columns, frame)
             if targets.index.size:
                 self.faces.append((frame, _Grid(targets)))
 
@@ -79,14 +82,14 @@ def candidate_pairs(polygons: FloatArray, cones: ConeGrids) -> tuple[IntArray, I
     """Pairs of polygons and cones that may overlap.
 
     Args:
-        polygons: (N, n, 3) corners minus the eye.
+        polygons: (n, 3, N) [corner, axis] minus the eye.
         cones: the cones.
 
     Returns:
         Indices of polygons and of cones, every pair once.
     """
     keys: list[IntArray] = []
-    if len(polygons):
+    if polygons.shape[2]:
         for frame, grid in cones.faces:
             found = _on_face(polygons, frame, grid, cones.count)
             if found.size:
@@ -100,32 +103,38 @@ def candidate_pairs(polygons: FloatArray, cones: ConeGrids) -> tuple[IntArray, I
 def _on_face(polygons: FloatArray, frame: FloatArray, grid: _Grid, count: int) -> IntArray:
     """Keys polygon·`count` + cone of the pairs whose rectangles meet on one face."""
     movers = grid.within(footprints(polygons, frame))
-    result = []
     cells = grid.cells(movers)
-    work = np.cumsum(_areas(cells))
-    first = 0
-    while first < movers.index.size:
-        done = work[first - 1] if first else 0
-        last = max(int(np.searchsorted(work, done + _CHUNK // 8, side="right")), first + 1)
-        part = np.arange(first, last)
-        mover, target = grid.meeting(movers.take(part), cells[:, first:last])
-        result.append(movers.index[first + mover] * count + grid.targets.index[target])
-        first = last
+    areas = _areas(cells)
+    result = []
+    for some in (np.flatnonzero(areas == 1), np.flatnonzero(areas > 1)):
+        work = np.cumsum(areas.take(some))
+        first = 0
+        while first < some.size:
+            done = work[first - 1] if first else 0
+            last = max(int(np.searchsorted(work, done + _CHUNK // 8, side="right")), first + 1)
+            part = some[first:last]
+            mover, target = grid.meeting(movers.take(part), cells.take(part, axis=1))
+            result.append(movers.index.take(part.take(mover)) * count + grid.targets.index.take(target))
+            first = last
     return np.concatenate(result) if result else np.zeros(0, dtype=np.int64)
 
 
 def footprints(polygons: FloatArray, frame: FloatArray) -> Footprints:
-    """Rectangles of the polygons (N, n, 3) that may be seen through a face."""
-    px, py, pz = np.ascontiguousarray(polygons.transpose(2, 1, 0))
+    """Rectangles of the polygons (n, 3, N) that may be seen through a face."""
+    px, py, pz = polygons.transpose(1, 0, 2)
     x, y, w = (axis[0] * px + axis[1] * py + axis[2] * pz for axis in frame)  # (n, N): corners first
     beside = (x > w).all(axis=0) | (-x > w).all(axis=0) | (y > w).all(axis=0) | (-y > w).all(axis=0)
     index = np.flatnonzero((w > 0).any(axis=0) & ~beside)
-    x, y, w = x[:, index], y[:, index], w[:, index]
+    if index.size < beside.size:
+        x, y, w = (values.take(index, axis=1) for values in (x, y, w))
     front = (w > _NEAR_PLANE * (np.abs(x) + np.abs(y) + np.abs(w))).all(axis=0)
-    safe = np.where(front, w, 1.0)
-    x, y = x / safe, y / safe
+    all_front = bool(front.all())
+    scale = np.reciprocal(w if all_front else np.where(front, w, 1.0))
+    x *= scale
+    y *= scale
     low, high = (np.stack([reduce(extreme, axis) for axis in (x, y)]) for extreme in (np.minimum, np.maximum))
-    low[:, ~front], high[:, ~front] = -1.0, 1.0
+    if not all_front:
+        low[:, ~front], high[:, ~front] = -1.0, 1.0
     seen = np.flatnonzero((low[0] <= 1) & (low[1] <= 1) & (high[0] >= -1) & (high[1] >= -1))
     prints = Footprints(index, low, high).take(seen)
     np.maximum(prints.low, -1.0, out=prints.low)
@@ -178,17 +187,21 @@ class _Grid:
         greater of the two least corners, which is unique.
         """
         owner, cell = self._enumerate(cells)
+        once = owner.size == movers.index.size  # one cell each
         first = self.start[cell]
         counts = self.start[cell + 1] - first
         visit, rank = segments(np.concatenate(([0], np.cumsum(counts))))
         rank += first.take(visit)
-        mover, target, cell = owner.take(visit), self.members.take(rank), cell.take(visit)
+        mover, target = owner.take(visit), self.members.take(rank)
         meets = np.ones(mover.size, dtype=np.bool_)
         for axis in range(2):
             meets &= movers.low[axis].take(mover) <= self.targets.high[axis].take(target)
             meets &= self.targets.low[axis].take(target) <= movers.high[axis].take(mover)
         keep = np.flatnonzero(meets)
-        mover, target, cell = mover.take(keep), target.take(keep), cell.take(keep)
+        mover, target = mover.take(keep), target.take(keep)
+        if once:
+            return mover, target
+        cell = cell.take(visit.take(keep))
         column, row = (np.maximum(cells[k].take(mover), self.box[k].take(target)) for k in (0, 1))
         here = np.flatnonzero(cell == row * self.side + column)
         return mover.take(here), target.take(here)

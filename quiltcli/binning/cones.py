@@ -19,8 +19,6 @@ from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross
 from quiltcli.layout import Layout
 
 _LONGEST_MITRE = 4.0
-_FEW = 4
-_MANY = 1 << 16
 _AT_ONCE = 1 << 14
 
 
@@ -161,7 +159,12 @@ def _padded(polygons: list[FloatArray]) -> FloatArray:
 
 
 def overlapping(
-    triangle: FloatArray, planes: FloatArray, wide: FloatArray, first: IntArray, second: IntArray
+    triangle: FloatArray,
+    planes: FloatArray,
+    wide: FloatArray,
+    first: IntArray,
+    second: IntArray,
+    few: int = 0,
 ) -> BoolArray:
     """Which pairs of convex cones have directions in common; touching counts.
 
@@ -170,52 +173,46 @@ def overlapping(
     are apart always have such a plane; beyond that a pair may be kept without need, never lost.
 
     Args:
-        triangle: (T, n, 3) polygons minus the eye.
+        triangle: (n, 3, T) polygons [corner, axis] minus the eye.
         planes: (K, m, 3) inward planes of cones.
         wide: (K, m, 3) corners of those cones.
         first: (N,) indices into `triangle`.
         second: (N,) indices into `planes`.
+        few: polygons that so many cones pass with their planes are not tested with their own.
     """
-    alive = np.arange(first.size)
-    alive = _within(planes, triangle, second, first, alive)
-    # Of very many, a polygon with few candidates is small: its own edges would reject next to nothing.
-    few = _FEW if alive.size > _MANY else 0
-    large = np.bincount(first[alive], minlength=len(triangle))[first[alive]] > few
-    rest = alive[large]
+    meets = _within(by_corner(planes), triangle, second, first)
+    alive = np.flatnonzero(meets)
+    rest = alive[np.bincount(first[alive], minlength=triangle.shape[2])[first[alive]] > few]
     if rest.size:
         used, place = np.unique(first[rest], return_inverse=True)
-        own = cone_planes(triangle[used])
-        kept = _within(own, wide, place, second[rest], np.arange(rest.size))
-        alive = np.concatenate((alive[~large], rest[kept]))
-    meets = np.zeros(first.size, dtype=np.bool_)
-    meets[alive] = True
+        own = cone_planes(triangle.take(used, axis=2).transpose(2, 0, 1))
+        meets[rest] = _within(by_corner(own), by_corner(wide), place, second[rest])
     return meets
 
 
-def _within(
-    planes: FloatArray, corners: FloatArray, of_planes: IntArray, of_corners: IntArray, alive: IntArray
-) -> IntArray:
-    """Those `alive` pairs of which no plane has all the corners on its outer side.
+def by_corner(polygons: FloatArray) -> FloatArray:
+    """Polygons (N, n, 3) as (n, 3, N), contiguous along N."""
+    return np.ascontiguousarray(polygons.transpose(1, 2, 0))
+
+
+def _within(planes: FloatArray, corners: FloatArray, of_planes: IntArray, of_corners: IntArray) -> BoolArray:
+    """The pairs of which no plane has all the corners on its outer side.
 
     Args:
-        planes: (K, m, 3) inward planes.
-        corners: (T, n, 3) polygons.
+        planes: (m, 3, K) inward planes.
+        corners: (n, 3, T) polygons.
         of_planes: (N,) index into `planes` of each pair.
         of_corners: (N,) index into `corners`.
-        alive: pairs to look at.
     """
-    corners = np.ascontiguousarray(corners.transpose(1, 2, 0))
-    planes = np.ascontiguousarray(planes.transpose(1, 2, 0))
-    found = []
-    for at in range(0, alive.size, _AT_ONCE):
-        part = alive[at : at + _AT_ONCE]
-        plane_of, points = of_planes.take(part), np.take(corners, of_corners.take(part), axis=2)
-        inside = np.ones(part.size, dtype=np.bool_)
+    result = np.ones(of_planes.size, dtype=np.bool_)
+    for at in range(0, of_planes.size, _AT_ONCE):
+        part = slice(at, at + _AT_ONCE)
+        points, inside = np.take(corners, of_corners[part], axis=2), result[part]
         for edge in planes:
-            nx, ny, nz = np.take(edge, plane_of, axis=1)
-            outside = np.ones(part.size, dtype=np.bool_)
-            for x, y, z in points:
+            nx, ny, nz = np.take(edge, of_planes[part], axis=1)
+            x, y, z = points[0]
+            outside = nx * x + ny * y + nz * z < 0
+            for x, y, z in points[1:]:
                 outside &= nx * x + ny * y + nz * z < 0
             inside &= ~outside
-        found.append(part[inside])
-    return np.concatenate(found) if found else alive
+    return result

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from quiltcli.binning.broad import candidate_pairs
-from quiltcli.binning.cones import Cones, overlapping
+from quiltcli.binning.cones import Cones, by_corner, overlapping
 from quiltcli.geometry import FloatArray, IntArray, dot, segments
 
 _MARGIN = 1e-5
@@ -54,10 +54,11 @@ def facet_cores(cones: Cones) -> tuple[FloatArray, IntArray]:
 
 def _conflicts(cones: Cones) -> tuple[IntArray, IntArray]:
     """Parts and the parts of other facets whose grown cones meet them."""
-    first, second = candidate_pairs(cones.corners, cones.grids)
+    corners = by_corner(cones.corners)
+    first, second = candidate_pairs(corners, cones.grids)
     other = cones.facet[first] != cones.facet[second]
     first, second = first[other], second[other]
-    meets = overlapping(cones.corners, cones.planes, cones.wide, first, second)
+    meets = overlapping(corners, cones.planes, cones.wide, first, second)
     return first[meets], second[meets]
 
 

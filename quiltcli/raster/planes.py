@@ -141,12 +141,6 @@ def project(corners: FloatArray, matrix: FloatArray, result: FloatArray) -> Floa
     return result
 
 
-def gather_corners(vertices: FloatArray, triangles: Int32Array) -> FloatArray:
-    """Corners (3, 3, N) [corner, axis] of `triangles` (N, 3), contiguous along N."""
-    rows = vertices.take(triangles.T.ravel(), axis=0).reshape(3, -1, 3)
-    return np.ascontiguousarray(rows.transpose(0, 2, 1))
-
-
 def pixel_boxes(
     homogeneous: FloatArray, width: IntArray | FloatArray, height: IntArray | FloatArray
 ) -> Int32Array:

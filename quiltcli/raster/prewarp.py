@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.binning import Pairs
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, gather_corners, segments
 from quiltcli.homography import QuiltRays
 from quiltcli.raster.blocks import SIDE, Blocks
-from quiltcli.raster.planes import LATTICE, Warped, gather_corners, pixel_boxes, project
+from quiltcli.raster.planes import LATTICE, Warped, pixel_boxes, project
 
 _CHUNK = 1 << 14
 
