@@ -131,15 +131,12 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     return Share(keys, drawn.size, pairs.reaching, pairs.settled, pairs.facet.size)
 
 
-def join(scene: Scene, blocks: Blocks, seen: Seen, shares: Iterable[Share]) -> Binned:
-    """The frame, when all its shares are done."""
+def join(scene: Scene, seen: Seen, shares: Iterable[Share], pairs: BlockPairs) -> Binned:
+    """The frame, when all its shares are done; `pairs` are those of all shares."""
     shares = list(shares)
-    keys = shares[0].keys if len(shares) == 1 else np.concatenate([share.keys for share in shares])
-    if len(shares) > 1:
-        keys.sort()
     return Binned(
         sight=Sight(seen.vertices, scene.triangles, seen.cut),
-        pairs=pairs_by_block(keys, blocks),
+        pairs=pairs,
         triangles=sum(share.triangles for share in shares),
         reaching=sum(share.reaching for share in shares),
         settled=sum(share.settled for share in shares),
@@ -151,7 +148,8 @@ def bin_frame(plan: BinPlan) -> Binned:
     """Bin a frame in one share."""
     seen = unseen(plan.scene)
     see_vertices(plan, slice(0, len(seen.vertices)), seen)
-    return join(plan.scene, plan.blocks, seen, [bin_share(plan, slice(0, len(seen.cut)), seen)])
+    share = bin_share(plan, slice(0, len(seen.cut)), seen)
+    return join(plan.scene, seen, [share], pairs_by_block([share.keys], plan.blocks))
 
 
 def faces_eye(planes: FloatArray, eye: FloatArray) -> BoolArray:

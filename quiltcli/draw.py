@@ -190,7 +190,7 @@ def draw_frame(
         rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
         binned = crew.bin(viewer, rays)
     frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
-    written = np.diff(frame.pairs.start) > 0
+    written = frame.pairs.per_block > 0
     stale = np.zeros(written.size, dtype=np.bool_)
     with clock.stage("clear"):
         if only is None and dirty is not None:

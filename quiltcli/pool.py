@@ -31,7 +31,7 @@ from quiltcli.draw import Buffers, Stage, Threads, clear_blocks, draw_batch, pla
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
 from quiltcli.homography import QuiltRays, quilt_rays
-from quiltcli.raster import BlockPairs, Frame, Sight
+from quiltcli.raster import BlockPairs, Frame, Sight, pairs_by_block
 from quiltcli.viewer import Viewer
 
 _ROOM = 8  # pairs a triangle there is room for; memory that is not touched costs nothing
@@ -73,29 +73,25 @@ class _Arena:
 
     Attributes:
         seen: what is known of vertices and triangles.
-        keys: (capacity,) block pairs, those of triangle t from t·capacity/T on.
-        start: (B+1,) offsets of the blocks' pairs.
-        triangle: (capacity,) their triangles.
+        pairs: block pairs; those of triangle t lie from t·C/T on in the C numbers of their memory.
     """
 
     seen: Seen
-    keys: NDArray[np.int64]
-    start: NDArray[np.int64]
-    triangle: NDArray[np.int32]
+    pairs: BlockPairs
 
-    def keys_of(self, part: slice) -> NDArray[np.int64]:
-        """Room for the pairs of some of the triangles."""
-        room = self.keys.size // max(len(self.seen.cut), 1)
-        return self.keys[part.start * room : part.stop * room]
+    def frame_pairs(self) -> BlockPairs:
+        """The pairs of the frame under way; a record of its own, for it keeps what it has counted."""
+        return replace(self.pairs)
 
-    def pairs(self) -> BlockPairs:
-        """The frame's pairs by block."""
-        return BlockPairs(self.start, self.triangle[: self.start[-1]])
+    def begin(self, triangle: int) -> int:
+        """Where the pairs of a share that begins with this triangle lie."""
+        return triangle * (self.pairs.memory.size // max(len(self.seen.cut), 1))
 
 
-def _new_arena(stage: Stage) -> _Arena:
+def _new_arena(stage: Stage, workers: int) -> _Arena:
     vertices, triangles = len(stage.scene.vertices), len(stage.scene.triangles)
     room = max(_ROOM * triangles, _LEAST_ROOM)
+    shares, blocks = _SHARES * workers, len(stage.blocks.facet)
     return _Arena(
         Seen(
             shared_array(3 * vertices, np.float64).reshape(-1, 3),
@@ -103,9 +99,11 @@ def _new_arena(stage: Stage) -> _Arena:
             shared_array(vertices, np.int32),
             shared_array(triangles, np.bool_),
         ),
-        shared_array(room, np.int64),
-        shared_array(len(stage.blocks.facet) + 1, np.int64),
-        shared_array(room, np.int32),
+        BlockPairs(
+            shared_array(shares * blocks, np.int64).reshape(shares, blocks),
+            shared_array(shares * blocks, np.int64).reshape(shares, blocks),
+            shared_array(room, np.int32),
+        ),
     )
 
 
@@ -174,7 +172,7 @@ class Pool:
     def __init__(self, stage: Stage, buffers: Sequence[Buffers], workers: int) -> None:
         self._stage = stage
         self._buffers = buffers
-        self._arena = _new_arena(stage)
+        self._arena = _new_arena(stage, workers)
         self._frame = 0
         # Made once, before there are copies of the process.
         _ = stage.scene.planes, stage.scene.corner_normals, stage.scene.corner_colors
@@ -216,17 +214,10 @@ class Pool:
         seen, arena = self._arena.seen, self._arena
         self._share_out(_Item("see", (part,)) for part in self._shares(len(seen.vertices)))
         parts = self._shares(len(seen.cut))
-        shares = self._share_out(_Item("bin", (part,)) for part in parts)
+        shares = self._share_out(_Item("bin", (number, part)) for number, part in enumerate(parts))
         if None in shares:
             return bin_frame(plan_of(self._stage, viewer, rays))
-        found = [
-            replace(share, keys=arena.keys_of(part)[:count])
-            for (share, count), part in zip(shares, parts, strict=True)
-        ]
-        binned = join(self._stage.scene, self._stage.blocks, seen, found)
-        arena.start[:] = binned.pairs.start
-        arena.triangle[: binned.pairs.triangle.size] = binned.pairs.triangle
-        return replace(binned, pairs=arena.pairs())
+        return join(self._stage.scene, seen, shares, arena.frame_pairs())
 
     def clear(self, blocks: NDArray[np.int64], buffers: Buffers) -> None:
         """Empty the pixels of blocks in one of the pool's buffers."""
@@ -241,10 +232,10 @@ class Pool:
             How many pixels of facets show the scene.
         """
         pairs = frame.pairs
-        if pairs.start is not self._arena.start:
+        if pairs.memory is not self._arena.pairs.memory:
             return Threads(self._stage, len(self._workers)).draw(frame, work, buffers, stale)
         index = self._index(buffers)
-        cost = [int(pairs.start[last] - pairs.start[first]) for first, last in work]
+        cost = [int(pairs.per_block[first:last].sum()) for first, last in work]
         dearest = np.argsort(cost, kind="stable")[::-1].tolist()
         return sum(self._share_out(_Item("draw", (work[i], index, stale[slice(*work[i])])) for i in dearest))
 
@@ -294,19 +285,21 @@ class _Workplace:
         """Find out about some of the vertices."""
         see_vertices(self.plan, part, self._arena.seen)
 
-    def bin(self, part: slice) -> tuple[Share, int] | None:
+    def bin(self, number: int, part: slice) -> Share | None:
         """Bin some of the triangles.
 
         Returns:
-            the share without its keys, which go into the arena, and their number; None if there is no
-            room for so many.
+            the share without its keys, whose pairs go into the arena; None if there is no room for so many.
         """
         share = bin_share(self.plan, part, self._arena.seen)
-        room = self._arena.keys_of(part)
-        if share.keys.size > room.size:
+        first, end = self._arena.begin(part.start), self._arena.begin(part.stop)
+        if share.keys.size > end - first:
             return None
-        room[: share.keys.size] = share.keys
-        return replace(share, keys=share.keys[:0]), share.keys.size
+        found, kept = pairs_by_block([share.keys], self._stage.blocks), self._arena.pairs
+        kept.memory[first : first + share.keys.size] = found.memory
+        kept.first[number] = first + found.first[0]
+        kept.count[number] = found.count[0]
+        return replace(share, keys=share.keys[:0])
 
     def clear(self, blocks: NDArray[np.int64], index: int) -> None:
         """Empty the pixels of some blocks."""
@@ -317,7 +310,7 @@ class _Workplace:
         if self._frame is None:
             seen, plan, stage = self._arena.seen, self.plan, self._stage
             sight = Sight(seen.vertices, stage.scene.triangles, seen.cut)
-            pairs = self._arena.pairs()
+            pairs = self._arena.frame_pairs()
             self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs)
         return draw_batch(self._stage, self._frame, batch, self._buffers[index], stale)
 

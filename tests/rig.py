@@ -156,7 +156,7 @@ def picture(
     pairs = bin_triangles(local, triangles, wanted, facet_parts(facets, layout, bleed), rays.lit, eye.eye)
     sight = Sight(local, triangles, cut)
     blocks = cut_blocks(layout, bleed, owners)
-    block_pairs = pairs_by_block(block_keys(pairs, sight, rays, blocks), blocks)
+    block_pairs = pairs_by_block([block_keys(pairs, sight, rays, blocks)], blocks)
     frame = Frame(eye, sight, rays, blocks, block_pairs)
     triangle = np.full(owners.size, -1, np.int64)
     depth = np.full(owners.size, np.inf)

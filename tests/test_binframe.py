@@ -14,6 +14,7 @@ from quiltcli.binframe import bin_frame, bin_share, join, see_vertices, unseen
 from quiltcli.display import lit_facets
 from quiltcli.draw import plan_of
 from quiltcli.homography import quilt_rays
+from quiltcli.raster import pairs_by_block
 
 
 @pytest.mark.parametrize("culling", [False, True])
@@ -32,11 +33,16 @@ def test_shares_together_have_the_pairs_of_the_whole(culling, depth):
         see_vertices(plan, slice(first, last), seen)
     ends = [0, 3, 500, 501, len(stage.scene.triangles)]
     shares = [bin_share(plan, slice(*part), seen) for part in pairwise(ends)]
-    found = join(stage.scene, stage.blocks, seen, shares)
+    pairs = pairs_by_block([share.keys for share in shares], stage.blocks)
+    found = join(stage.scene, seen, shares, pairs)
     assert whole.sight.cut.any()
     assert whole.triangles < len(stage.scene.triangles)
     np.testing.assert_array_equal(found.sight.cut, whole.sight.cut)
-    np.testing.assert_array_equal(found.pairs.start, whole.pairs.start)
-    np.testing.assert_array_equal(found.pairs.triangle, whole.pairs.triangle)
+    np.testing.assert_array_equal(found.pairs.per_block, whole.pairs.per_block)
+    some = np.arange(0, stage.blocks.facet.size, 2)
+    for ours, theirs in zip(found.pairs.of(some), whole.pairs.of(some), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    triangle, place = whole.pairs.of(some)
+    assert (np.diff(place.astype(np.int64) << 32 | triangle) > 0).all()
     for count in ("triangles", "reaching", "settled", "facet_pairs"):
         assert getattr(found, count) == getattr(whole, count) > 0

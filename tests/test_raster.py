@@ -260,6 +260,6 @@ def test_hits_and_missed_pixels_are_all_that_the_facets_own():
             block = np.arange(*batch)
             for part in (*(h.places for h in drawing.hits(raster.Wanted())), *drawing.missed(block)):
                 np.add.at(count, part.pixel, 1)
-        facet = shown.frame.blocks.facet[np.diff(shown.frame.pairs.start) > 0]
+        facet = shown.frame.blocks.facet[shown.frame.pairs.per_block > 0]
         np.testing.assert_array_equal(count, np.isin(np.abs(shown.owners), facet + 1))
         assert np.count_nonzero((count > 0) & (shown.triangle < 0)) > 1000

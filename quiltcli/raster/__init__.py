@@ -90,7 +90,7 @@ def batches(frame: Frame, wanted: BoolArray | None = None) -> list[tuple[int, in
         frame: the frame.
         wanted: (B,) the blocks that the ranges must hold; by default those that have pairs.
     """
-    counts = np.diff(frame.pairs.start)
+    counts = frame.pairs.per_block
     return cut_batches(counts, frame.blocks, counts > 0 if wanted is None else wanted)
 
 
@@ -139,7 +139,7 @@ def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.
         batch: one of `batches(frame)`.
         sample: where in the pixel to look, in pixels from its centre.
     """
-    counts = np.diff(frame.pairs.start)
+    counts = frame.pairs.per_block
     block = batch[0] + np.flatnonzero(counts[batch[0] : batch[1]])
     bits = serial_bits(int(counts[block].sum()))
     canvas = new_canvas(block, frame.blocks)

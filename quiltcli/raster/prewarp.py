@@ -6,7 +6,9 @@ pixels, which is the paper's prewarping (§3.2.2): from here on the whole quilt 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -38,13 +40,29 @@ class Sight:
 class BlockPairs:
     """N (triangle, block) pairs by block, then triangle.
 
+    They lie in memory as they were found: in S shares of ascending triangles, each by block.
+
     Attributes:
-        start: (B+1,) offsets of every block's pairs.
-        triangle: (N,) triangle index.
+        first: (S, B) where the pairs of every share with every block begin in `memory`.
+        count: (S, B) how many they are.
+        memory: (C,) triangle indices, and gaps between the shares.
     """
 
-    start: IntArray
-    triangle: Int32Array
+    first: IntArray
+    count: IntArray
+    memory: Int32Array
+
+    @cached_property
+    def per_block(self) -> IntArray:
+        """Number (B,) of every block's pairs."""
+        return np.asarray(self.count.sum(axis=0))
+
+    def of(self, block: IntArray) -> tuple[Int32Array, IntArray]:
+        """Triangles (n,) of the pairs of some blocks (K,), and for each the place among these blocks."""
+        count = np.ascontiguousarray(self.count[:, block].T).reshape(-1)
+        piece, rank = segments(np.concatenate(([0], np.cumsum(count))))
+        rank += np.ascontiguousarray(self.first[:, block].T).reshape(-1).take(piece)
+        return self.memory.take(rank), piece // len(self.count)
 
 
 def block_matrices(
@@ -84,10 +102,18 @@ def block_keys(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> I
     return keys
 
 
-def pairs_by_block(keys: IntArray, blocks: Blocks) -> BlockPairs:
-    """The block pairs of `block_keys`."""
-    start = np.searchsorted(keys, np.arange(blocks.facet.size + 1, dtype=np.int64) << 32)
-    return BlockPairs(start, (keys & 0xFFFFFFFF).astype(np.int32))
+def pairs_by_block(keys: Sequence[IntArray], blocks: Blocks) -> BlockPairs:
+    """The pairs of `block_keys`, of shares of ascending triangles."""
+    edges = np.arange(blocks.facet.size + 1, dtype=np.int64) << 32
+    start = np.stack([np.searchsorted(share, edges) for share in keys])
+    begin = np.cumsum([0, *(share.size for share in keys[:-1])])
+    memory = np.concatenate([triangles_of(share) for share in keys])
+    return BlockPairs(begin[:, None] + start[:, :-1], np.diff(start, axis=1), memory)
+
+
+def triangles_of(keys: IntArray) -> Int32Array:
+    """The triangles of `block_keys`."""
+    return (keys & 0xFFFFFFFF).astype(np.int32)
 
 
 def _blocks_under(
@@ -131,9 +157,7 @@ def warp(
         block: (K,) the blocks of the batch, ascending.
         matrices: (K, 3, 3) from `block_matrices`.
     """
-    counts = block_pairs.start[block + 1] - block_pairs.start[block]
-    place, rank = segments(np.concatenate(([0], np.cumsum(counts))))
-    triangle = block_pairs.triangle.take(block_pairs.start[block].take(place) + rank)
+    triangle, place = block_pairs.of(block)
     matrices = np.ascontiguousarray(matrices.transpose(1, 2, 0))
     extent = blocks.width[block].astype(np.float64), blocks.height[block].astype(np.float64)
     margin = blocks.margin[block].astype(np.int32)

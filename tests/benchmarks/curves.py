@@ -80,7 +80,7 @@ def _described(stage: Stage, viewer: Viewer, name: str) -> Row:
         "quilt pixels": int(stage.owners.size),
         "visible pixels": all_hits(work),
         "triangles": len(stage.scene.triangles),
-        "block pairs": int(work.frame.pairs.triangle.size),
+        "block pairs": int(work.frame.pairs.count.sum()),
     }
 
 

@@ -93,7 +93,7 @@ def _counts(stage: Stage, viewer: Viewer, work: Work, buffers: Buffers) -> dict[
     return {
         "triangles": record.triangles,
         "pairs": record.pairs,
-        "block pairs": int(work.frame.pairs.triangle.size),
+        "block pairs": int(work.frame.pairs.count.sum()),
         "visible pixels": record.visible_pixels,
     }
 

@@ -126,8 +126,8 @@ def all_hits(work: Work) -> int:
 
 def facet_pairs(frame: Frame) -> tuple[Int32Array, IntArray]:
     """Triangle (N,) and facet (N,) of every pair of a frame, by facet."""
-    facet = np.repeat(frame.blocks.facet.astype(np.int64), np.diff(frame.pairs.start))
-    keys = np.unique(facet << 32 | frame.pairs.triangle)
+    triangle, block = frame.pairs.of(np.arange(frame.blocks.facet.size))
+    keys = np.unique(frame.blocks.facet.astype(np.int64).take(block) << 32 | triangle)
     return (keys & 0xFFFFFFFF).astype(np.int32), keys >> 32
 
 
