@@ -30,24 +30,25 @@ def race(
     cold: Collection[str] = (),
     brief: Collection[str] = (),
 ) -> Times:
-    """Time every contestant `rounds` times, in turn, after a first time that does not count.
+    """Time every contestant `rounds` times, in turn, each time after one that does not count.
+
+    So all are timed as in a sequence, where a frame follows a frame, and not after somebody else.
 
     Args:
         contestants: what to time.
         rounds: how often.
         once: seconds; what takes longer is timed only once.
-        cold: those that have no use for a first time.
+        cold: those that have no use for a time before.
         brief: those that are timed once, as what they tell is beside the point.
     """
     times: Times = {name: {"wall": [], "cpu": []} for name in contestants}
-    for name in contestants:
-        if name not in cold and name not in brief:
-            contestants[name]()
     for _ in range(rounds):
         for name, run in contestants.items():
             before = times[name]["wall"]
             if before and (name in brief or before[0] > once):
                 continue
+            if name not in cold and name not in brief:
+                run()
             wall, cpu = time.perf_counter(), processor_seconds()
             run()
             times[name]["wall"].append(time.perf_counter() - wall)
