@@ -12,6 +12,7 @@ from quiltcli.channels import half_floats
 from quiltcli.raster.hits import RUN, Places
 from quiltcli.raster.vectors import (
     BASIS,
+    BlockVectors,
     PointVectors,
     TileVectors,
     along,
@@ -84,23 +85,47 @@ def tile_vectors(count, seed):
     return TileVectors(planes)
 
 
+def block_vectors(count, seed):
+    """Vectors of microtiles anywhere in seven blocks, and the same as planes over the microtiles."""
+    rng = np.random.default_rng(seed)
+    matrix = rng.normal(size=(3, 3, 7))
+    matrix[:, :2] *= 0.004
+    block, x, y = rng.integers(0, 7, count), 8 * rng.integers(0, 64, count), 8 * rng.integers(0, 64, count)
+    planes = matrix[:, :, block]
+    planes[:, 2] += planes[:, 0] * x + planes[:, 1] * y
+    return BlockVectors(matrix, block, x, y), planes
+
+
 def test_vectors_over_a_microtile_and_their_products_are_those_of_the_planes():
-    normals, rays = tile_vectors(300, 8), tile_vectors(300, 9)
+    normals, (rays, planes) = tile_vectors(300, 8), block_vectors(300, 9)
+    np.testing.assert_array_equal(rays.planes, planes)
     direction = np.float32([0.2, -0.7, 0.4])
     ones = PointVectors(np.random.default_rng(1).normal(size=(3, 300, 1)).astype(np.float32))
-    n, r = (np.einsum("cin,ip->cnp", one.planes, BASIS) for one in (normals, rays))
+    one = PointVectors(ones.values[:, :1])
+    n, r = (np.einsum("cin,ip->cnp", form, BASIS) for form in (normals.planes, planes))
     single = PointVectors(vector_values(normals))
     for got, expected in (
         (vector_values(normals), n),
+        (vector_values(rays), r),
         (along(normals, direction), np.einsum("cnp,c->np", n, direction)),
+        (along(rays, direction), np.einsum("cnp,c->np", r, direction)),
         (products(normals, rays), (n * r).sum(axis=0)),
+        (products(normals, normals), (n * n).sum(axis=0)),
         (products(rays, rays), (r * r).sum(axis=0)),
         (products(ones, rays), (ones.values * r).sum(axis=0)),
+        (products(one, rays), (one.values * r).sum(axis=0)),
     ):
-        np.testing.assert_allclose(got, expected, rtol=2.0**-23, atol=2.0**-45)
+        np.testing.assert_allclose(got, expected, rtol=2.0**-23, atol=2.0**-42)
     # Point by point, factors, products and sums are rounded in single precision, too.
     sizes = np.abs(n * r).sum(axis=0)
     assert (np.abs(products(single, rays) - (n * r).sum(axis=0)) <= 5 * 2.0**-24 * sizes).all()
+
+
+def test_products_with_one_normal_do_not_depend_on_how_often_it_is_given():
+    rays, _ = block_vectors(100, 3)
+    normal = np.random.default_rng(2).normal(size=(3, 1, 1)).astype(np.float32)
+    many = products(PointVectors(np.repeat(normal, 100, axis=1)), rays)
+    np.testing.assert_array_equal(products(PointVectors(normal), rays), many)
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.uint32])

@@ -7,12 +7,13 @@ planes or quadratics then: a few numbers a microtile say it all, and no vector i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import Float32Array, FloatArray
+from quiltcli.geometry import Float32Array, FloatArray, IntArray
 from quiltcli.raster.planes import power_of_two
 
 BASIS: FloatArray = np.stack((np.tile(np.arange(8.0), 8), np.repeat(np.arange(8.0), 8), np.ones(64)))
@@ -39,7 +40,54 @@ class TileVectors:
     planes: FloatArray
 
 
-Vectors: TypeAlias = PointVectors | TileVectors
+@dataclass(frozen=True)
+class BlockVectors:
+    """Vectors that are linear over blocks, as rays are, at the pixels of G microtiles.
+
+    Attributes:
+        matrix: (3, 3, K) planes over blocks [axis, coefficient], from their first pixels.
+        block: (G,) the block of each microtile.
+        x: (G,) first columns of the microtiles in their blocks.
+        y: (G,) first rows.
+    """
+
+    matrix: FloatArray
+    block: IntArray
+    x: IntArray
+    y: IntArray
+
+    @cached_property
+    def planes(self) -> FloatArray:
+        """Planes (3, 3, G) from the microtiles' first pixels."""
+        return self._moved(np.take(self.matrix, self.block, axis=2))
+
+    def along(self, direction: Float32Array | FloatArray) -> FloatArray:
+        """Planes (3, G) of the products with one direction (3,)."""
+        return self._moved(_sum_of_products(self.matrix, direction).take(self.block, axis=1))
+
+    def onto(self, vectors: Float32Array) -> FloatArray:
+        """Planes (3, G) of the products with vectors, (3, G, 1) one a microtile or (3, 1, 1) one for all."""
+        if vectors.shape[1] == 1:
+            return self.along(vectors[:, 0, 0])
+        part = np.take(self.matrix, self.block, axis=2)
+        return self._moved(_sum_of_products(part, vectors[:, None, :, 0]))
+
+    @cached_property
+    def squares(self) -> FloatArray:
+        """Quadratics (6, G) of the vectors' squared lengths."""
+        xx, xy, yy, x, y, one = _quadratic(self.matrix, self.matrix).take(self.block, axis=1)
+        one += self.x * (xx * self.x + xy * self.y + x) + self.y * (yy * self.y + y)
+        x += 2 * xx * self.x + xy * self.y
+        y += 2 * yy * self.y + xy * self.x
+        return np.stack((xx, xy, yy, x, y, one))
+
+    def _moved(self, plane: FloatArray) -> FloatArray:
+        """Planes (..., 3, G) over blocks made to begin at the microtiles, in place."""
+        plane[..., 2, :] += plane[..., 0, :] * self.x + plane[..., 1, :] * self.y
+        return plane
+
+
+Vectors: TypeAlias = PointVectors | TileVectors | BlockVectors
 
 
 def vector_values(vectors: Vectors) -> Float32Array:
@@ -54,15 +102,19 @@ def along(vectors: Vectors, direction: Float32Array) -> Float32Array:
     """Products (G, k) or (G, 1) with one direction (3,)."""
     if isinstance(vectors, PointVectors):
         return _sum_of_products(vectors.values, direction)
+    if isinstance(vectors, BlockVectors):
+        return single_values(vectors.along(direction))
     return single_values(_sum_of_products(vectors.planes, direction))
 
 
 def products(a: Vectors, b: Vectors) -> Float32Array:
     """Products (G, k) or (G, 1) of vectors, pixel by pixel."""
-    if isinstance(a, TileVectors) and isinstance(b, TileVectors):
+    if isinstance(a, BlockVectors) and a is b:
+        return single_values(a.squares)
+    if isinstance(a, PointVectors) and isinstance(b, BlockVectors) and a.values.shape[2] == 1:
+        return single_values(b.onto(a.values))
+    if not isinstance(a, PointVectors) and not isinstance(b, PointVectors):
         return single_values(_quadratic(a.planes, b.planes))
-    if isinstance(a, PointVectors) and isinstance(b, TileVectors) and a.values.shape[2] == 1:
-        return single_values(_sum_of_products(b.planes, a.values[:, None, :, 0]))
     return _sum_of_products(vector_values(a), vector_values(b))
 
 
@@ -74,21 +126,24 @@ def _quadratic(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.stack([part[0] + part[1] + part[2] for part in parts])
 
 
-def exact_values(form: FloatArray) -> FloatArray:
+def grid_values(form: FloatArray) -> FloatArray:
     """Values (G, 64) of forms at the pixels of microtiles, from their first pixel.
 
-    The forms are rounded to grids on which every sum is exact, so that neither the order of the sums
-    nor the machine can be told from the result.
-
     Args:
-        form: planes (3, G) of x, y and 1, or quadratics (6, G) of x², xy, y², x, y and 1.
+        form: planes (3, G) of x, y and 1, or quadratics (6, G) of x², xy, y², x, y and 1; on grids on which
+            every sum is exact, so that neither the order of the sums nor the machine can be told.
     """
+    return np.asarray(form.T @ _BASIS_OF[len(form)])
+
+
+def exact_values(form: FloatArray) -> FloatArray:
+    """As `grid_values`, of any forms: they are rounded to such grids before."""
     scale = _scale(form)
     grid = form / scale
     grid += _ROUND_TO[len(form)]
     grid -= _ROUND_TO[len(form)]
     grid *= scale
-    return np.asarray(grid.T @ _BASIS_OF[len(form)])
+    return grid_values(grid)
 
 
 def single_values(form: FloatArray) -> Float32Array:

@@ -23,10 +23,12 @@ from quiltcli.raster.planes import Planes, PlaneTable
 from quiltcli.raster.surfaces import has_one_normal, one_normal, surfaces
 from quiltcli.raster.vectors import (
     BASIS,
+    BlockVectors,
     PointVectors,
     TileVectors,
     Vectors,
     exact_values,
+    grid_values,
     vector_values,
 )
 
@@ -67,7 +69,8 @@ class Tiles:
 
     def lines(self) -> IntArray:
         """Quilt addresses (n, 8) of the first pixels of their rows."""
-        result: IntArray = self.address[:, None] + self.stride[:, None] * np.arange(8)
+        step = self.stride[:1, None] if (self.stride == self.stride[:1]).all() else self.stride[:, None]
+        result: IntArray = self.address[:, None] + step * np.arange(8)
         return result
 
     def places(self) -> Places:
@@ -238,7 +241,7 @@ def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool)
     seen = surfaces(planes, rows, wanted, handed, tiles.x, tiles.y)
     if wanted.normals is not None:
         normal = TileVectors(seen.normal.astype(np.float64))
-    inverse = exact_values(tiles.local(np.take(planes.inverse, rows, axis=1)))
+    inverse = grid_values(tiles.local(np.take(planes.inverse, rows, axis=1)))
     ray, depth, position = _rays(reader, tiles)
     depth /= inverse
     weights = None
@@ -259,7 +262,7 @@ def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool)
     )
 
 
-def _rays(reader: Reader, tiles: Tiles) -> tuple[TileVectors, FloatArray, FloatArray | None]:
+def _rays(reader: Reader, tiles: Tiles) -> tuple[BlockVectors, FloatArray, FloatArray | None]:
     """Rays d through the pixels of n microtiles.
 
     Returns:
@@ -268,16 +271,15 @@ def _rays(reader: Reader, tiles: Tiles) -> tuple[TileVectors, FloatArray, FloatA
     """
     limits = reader.limits
     matrix = np.ascontiguousarray(limits.rays.transpose(1, 2, 0))
-    ray = tiles.local(np.take(matrix, tiles.block, axis=2))
+    ray = BlockVectors(matrix, tiles.block, tiles.x, tiles.y)
     exact = None
     if limits.radial or reader.wanted.position:
-        exact = np.stack([exact_values(plane) for plane in ray])
+        exact = np.stack([exact_values(plane) for plane in ray.planes])
     if limits.radial and exact is not None:
         depth = np.sqrt(exact[0] * exact[0] + exact[1] * exact[1] + exact[2] * exact[2])
     else:
-        look = limits.look
-        depth = exact_values(look[0] * ray[0] + look[1] * ray[1] + look[2] * ray[2])
-    return TileVectors(ray), depth, exact if reader.wanted.position else None
+        depth = exact_values(ray.along(limits.look))
+    return ray, depth, exact if reader.wanted.position else None
 
 
 def _complete_tiles(reader: Reader, tiles: Tiles) -> Hits:
