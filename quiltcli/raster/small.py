@@ -20,9 +20,9 @@ from quiltcli.raster.keys import make_keys, serial_part
 from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import Planes, PlaneTable, Warped, depth_bounds
 
-SIZES = (1, 2, 3, 4, 6, 8, 12)
+SIZES = (2, 3, 5, 8, 12)
 LIMIT = SIZES[-1]
-_RUN = 1 << 15
+_RUN = 1 << 16
 _CANDIDATES = 1 << 16
 _SHAPES = len(SIZES) ** 2
 _SOME = 8  # of so many microtiles one has to be covered for a look at all pairs to be worth its time
