@@ -15,7 +15,15 @@ import numpy as np
 from quiltcli.binning import Cones, Cores, Parts, lit_cones, pairs_of
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
 from quiltcli.homography import QuiltRays
-from quiltcli.raster import BlockPairs, Blocks, Sight, block_keys, pairs_by_block, triangles_in_range
+from quiltcli.raster import (
+    BlockPairs,
+    Blocks,
+    Sight,
+    block_keys,
+    pairs_by_block,
+    triangles_in_range,
+    vertex_blocks,
+)
 from quiltcli.scene import Scene
 from quiltcli.viewer import Viewer
 
@@ -28,12 +36,14 @@ class Seen:
         vertices: (V, 3) world minus eye, metres.
         depth: (V,) as the viewer measures it, metres.
         core: (V,) part of the display whose core the ray through the vertex meets, −1 for none.
+        block: (V,) the block that it lies well inside of, −1 for none.
         cut: (T,) triangles that reach beyond the near or far depth.
     """
 
     vertices: FloatArray
     depth: FloatArray
     core: Int32Array
+    block: Int32Array
     cut: BoolArray
 
 
@@ -106,6 +116,7 @@ def unseen(scene: Scene) -> Seen:
         np.empty((count, 3)),
         np.empty(count),
         np.empty(count, dtype=np.int32),
+        np.empty(count, dtype=np.int32),
         np.empty(len(scene.triangles), dtype=np.bool_),
     )
 
@@ -114,7 +125,9 @@ def see_vertices(plan: BinPlan, part: slice, seen: Seen) -> None:
     """Find out about some of the vertices and write it down."""
     vertices = np.subtract(plan.scene.vertices[part], plan.viewer.eye, out=seen.vertices[part])
     seen.depth[part] = plan.viewer.depth_of(vertices.T)
-    seen.core[part] = plan.cores.met_by(vertices)
+    core = seen.core[part] = plan.cores.met_by(vertices)
+    facet = np.append(plan.cones.facet, np.int32(-1)).take(core)
+    seen.block[part] = vertex_blocks(vertices, facet, plan.rays, plan.blocks)
 
 
 def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
@@ -126,9 +139,22 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
         wanted &= faces_eye(scene.planes[:, part], eye)
     drawn = np.flatnonzero(wanted)
     drawn += part.start
-    pairs = pairs_of(seen.vertices, scene.triangles, drawn, seen.core, plan.cones)
-    keys = block_keys(pairs, Sight(seen.vertices, scene.triangles, seen.cut), plan.rays, plan.blocks)
-    return Share(keys, drawn.size, pairs.reaching, pairs.settled, pairs.facet.size)
+    corner = scene.triangles if drawn.size == len(scene.triangles) else scene.triangles.take(drawn, axis=0)
+    a, b, c = (seen.block.take(corner[:, k]) for k in range(3))
+    same = (a == b) & (b == c) & (a >= 0)
+    inside, rest = np.flatnonzero(same), np.flatnonzero(~same)
+    pairs = pairs_of(seen.vertices, scene.triangles, drawn[rest], seen.core, plan.cones)
+    sight = Sight(seen.vertices, scene.triangles, seen.cut)
+    at_once = a[inside].astype(np.int64) << 32 | drawn[inside]
+    keys = np.concatenate((at_once, block_keys(pairs, sight, plan.rays, plan.blocks)))
+    keys.sort()
+    return Share(
+        keys=keys,
+        triangles=drawn.size,
+        reaching=inside.size + pairs.reaching,
+        settled=inside.size + pairs.settled,
+        pairs=inside.size + pairs.facet.size,
+    )
 
 
 def join(scene: Scene, seen: Seen, shares: Iterable[Share], pairs: BlockPairs) -> Binned:

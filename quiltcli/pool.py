@@ -97,6 +97,7 @@ def _new_arena(stage: Stage, workers: int) -> _Arena:
             shared_array(3 * vertices, np.float64).reshape(-1, 3),
             shared_array(vertices, np.float64),
             shared_array(vertices, np.int32),
+            shared_array(vertices, np.int32),
             shared_array(triangles, np.bool_),
         ),
         BlockPairs(

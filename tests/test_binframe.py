@@ -15,6 +15,7 @@ from quiltcli.display import lit_facets
 from quiltcli.draw import plan_of
 from quiltcli.homography import quilt_rays
 from quiltcli.raster import pairs_by_block
+from quiltcli.raster.prewarp import triangles_of
 
 
 @pytest.mark.parametrize("culling", [False, True])
@@ -46,3 +47,27 @@ def test_shares_together_have_the_pairs_of_the_whole(culling, depth):
     assert (np.diff(place.astype(np.int64) << 32 | triangle) > 0).all()
     for count in ("triangles", "reaching", "settled", "facet_pairs"):
         assert getattr(found, count) == getattr(whole, count) > 0
+
+
+@pytest.mark.parametrize("density", [100, 400, 700])
+def test_triangles_well_inside_a_block_are_found_where_their_boxes_are(density):
+    """Facets of one block and of several; what is settled at once is what the boxes of all pairs say."""
+    stage = stage_of_facets(cube(density), ball_scene(5))
+    eye = viewer((2.2, 1.8, 3.2))
+    rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, eye.eye), eye.eye)
+    plan = plan_of(stage, eye, rays)
+    seen = unseen(stage.scene)
+    see_vertices(plan, slice(0, len(stage.scene.vertices)), seen)
+    quick = bin_share(plan, slice(0, len(stage.scene.triangles)), seen)
+    assert np.count_nonzero(seen.block >= 0) > 0.5 * seen.block.size
+    if density > 256:
+        assert len(np.unique(seen.block)) > 3
+    seen.block[:] = -1
+    slow = bin_share(plan, slice(0, len(stage.scene.triangles)), seen)
+    assert quick.pairs == slow.pairs
+    assert quick.settled == slow.settled
+    # What is settled is not asked whether it meets the centre of a pixel at all.
+    assert np.isin(slow.keys, quick.keys).all()
+    more = np.setdiff1d(quick.keys, slow.keys)
+    assert not np.isin(triangles_of(more), triangles_of(slow.keys)).any()
+    assert more.size < 0.2 * slow.keys.size

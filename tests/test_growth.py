@@ -23,8 +23,7 @@ PIXELS = 400_000  # of all facets together, lit or not
 
 PROBES = {
     (binning, "candidate_pairs"): lambda found, *_: {"proposed": found[0].size},
-    (binframe, "pairs_of"): lambda pairs, *_: {"pairs": pairs.facet.size},
-    (binframe, "block_keys"): lambda keys, *_: {"block pairs": keys.size},
+    (binframe, "bin_share"): lambda share, *_: {"pairs": share.pairs, "block pairs": share.keys.size},
     (raster, "draw_small"): lambda candidates, *_: {"small": candidates},
     (raster, "draw_large"): lambda evaluated, *_: {"large": evaluated},
     (draw, "block_window"): lambda pixels, buffer, *_: {"bytes": pixels.size * buffer.itemsize},

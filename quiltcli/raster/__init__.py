@@ -37,6 +37,7 @@ from quiltcli.raster.prewarp import (
     block_keys,
     block_matrices,
     pairs_by_block,
+    vertex_blocks,
     warp,
 )
 from quiltcli.raster.small import LIMIT, draw_small
@@ -59,6 +60,7 @@ __all__ = [
     "pairs_by_block",
     "rasterize",
     "triangles_in_range",
+    "vertex_blocks",
 ]
 
 

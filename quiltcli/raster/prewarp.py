@@ -19,6 +19,7 @@ from quiltcli.raster.blocks import SIDE, Blocks
 from quiltcli.raster.planes import LATTICE, Warped, pixel_boxes, project
 
 _CHUNK = 1 << 14
+_WELL_INSIDE = 2.0  # pixels; boxes are a pixel wider than their triangles, for samples beside the centre
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,49 @@ def block_keys(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> I
     if rest.size:
         keys.sort()
     return keys
+
+
+def vertex_blocks(vertices: FloatArray, facet: Int32Array, rays: QuiltRays, blocks: Blocks) -> Int32Array:
+    """The blocks (n,) that vertices lie well inside of, −1 where there is none.
+
+    A triangle all of whose corners have the same block needs no other, for what is well inside is convex.
+
+    Args:
+        vertices: (n, 3) minus the eye.
+        facet: (n,) the facet that shows each vertex and what is about it, −1 for none.
+        rays: rays through the quilt.
+        blocks: the blocks.
+    """
+    result = np.full(facet.size, -1, dtype=np.int32)
+    count = np.diff(blocks.start)
+    known = np.flatnonzero(facet >= 0)
+    several = count.take(facet[known]) > 1
+    alone, known = known[~several], known[several]
+    result[alone] = blocks.start.take(facet[alone])
+    if not known.size:
+        return result
+    first = np.where(count > 0, blocks.start[:-1], 0)  # facets that have no place are never asked about
+    last = first + np.maximum(count, 1) - 1
+    matrices = np.ascontiguousarray(block_matrices(rays, blocks, first, (0.0, 0.0)).transpose(1, 2, 0))
+    width = blocks.x0[last] + blocks.width[last] - blocks.x0[first]
+    height = blocks.y0[last] + blocks.height[last] - blocks.y0[first]
+    for at in range(0, known.size, _CHUNK):
+        some = known[at : at + _CHUNK]
+        of = facet.take(some)
+        corner = np.ascontiguousarray(vertices.take(some, axis=0).T)[None]
+        x, y, w = project(corner, np.take(matrices, of, axis=2), np.empty_like(corner))[0]
+        left, right = _cells_about(x / w, width.take(of))
+        top, bottom = _cells_about(y / w, height.take(of))
+        block = first.take(of) + top * blocks.columns.take(of) + left
+        result[some] = np.where((left == right) & (top == bottom), block, -1)
+    return result
+
+
+def _cells_about(pixel: FloatArray, extent: IntArray) -> tuple[IntArray, IntArray]:
+    """First and last block (n,), by columns or rows, of all that is near pixels (n,) of an `extent` (n,)."""
+    low = np.maximum(pixel - _WELL_INSIDE, 0.0)
+    high = np.minimum(pixel + _WELL_INSIDE, extent - 1.0)
+    return low.astype(np.int64) // SIDE, high.astype(np.int64) // SIDE
 
 
 def pairs_by_block(keys: Sequence[IntArray], blocks: Blocks) -> BlockPairs:

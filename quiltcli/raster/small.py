@@ -20,7 +20,7 @@ from quiltcli.raster.keys import make_keys, serial_part
 from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import Planes, PlaneTable, Warped, depth_bounds
 
-SIZES = (2, 3, 5, 8, 12)
+SIZES = (1, 2, 3, 4, 6, 8, 12)
 LIMIT = SIZES[-1]
 _RUN = 1 << 16
 _CANDIDATES = 1 << 16
