@@ -304,6 +304,7 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)
         visible += hits.inside
+    drawing.done()
     return visible
 
 

@@ -263,3 +263,18 @@ def test_hits_and_missed_pixels_are_all_that_the_facets_own():
         facet = shown.frame.blocks.facet[shown.frame.pairs.per_block > 0]
         np.testing.assert_array_equal(count, np.isin(np.abs(shown.owners), facet + 1))
         assert np.count_nonzero((count > 0) & (shown.triangle < 0)) > 1000
+
+
+def test_a_canvas_in_memory_that_was_used_shows_nothing_of_it():
+    points = np.random.default_rng(8).normal(size=(300, 3)) * 0.4
+    facets, eye = display(icosphere(1)[0], icosphere(1)[1].tolist(), 70), viewer((2.2, 1.8, 3.2))
+    shown = [picture(facets, points * k, np.arange(300).reshape(-1, 3), eye) for k in (1.0, 0.8)]
+    for _ in range(2):
+        for one in shown:
+            seen = np.full(one.owners.size, -1)
+            for batch in raster.batches(one.frame):
+                drawing = raster.draw(one.frame, batch)
+                for hits in drawing.hits(raster.Wanted()):
+                    hits.put(seen, hits.triangle[:, None])
+                drawing.done()
+            np.testing.assert_array_equal(seen, one.triangle)

@@ -22,6 +22,7 @@ from quiltcli.raster.blocks import (
     block_window,
     cut_batches,
     cut_blocks,
+    give_back,
     new_canvas,
     ray_matrices,
 )
@@ -121,6 +122,10 @@ class Drawing:
     def missed(self, block: IntArray) -> Iterator[Places]:
         """The pixels of facets that see nothing, in those of these blocks that have pairs."""
         return missed_pixels(self.canvas, self.blocks, np.isin(self.canvas.block, block))
+
+    def done(self) -> None:
+        """Leave the drawing's memory to the next; nothing may be read from it any more."""
+        give_back(self.canvas)
 
 
 def rasterize(

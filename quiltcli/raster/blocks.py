@@ -7,6 +7,7 @@ cache. Keys are kept in microtiles: 8 × 8 pixels that are 64 neighbours in memo
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -233,10 +234,31 @@ def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
         tiles_down=tiles // across,
         number=number,
         used=blocks.used.take(number),
-        keys=np.zeros((count, 64), dtype=np.int64),
+        keys=_empty_keys(count),
         touched=np.zeros(count, dtype=np.bool_),
         filler=np.zeros(count, dtype=np.int64),
     )
+
+
+class _Spare(threading.local):
+    """Keys of an earlier canvas of this thread, all 0: emptying what was drawn is less work than all."""
+
+    keys: IntArray | None = None
+
+
+_SPARE = _Spare()
+
+
+def _empty_keys(count: int) -> IntArray:
+    """Keys (count, 64) that are 0."""
+    keys, _SPARE.keys = _SPARE.keys, None
+    return keys[:count] if keys is not None and len(keys) >= count else np.zeros((count, 64), dtype=np.int64)
+
+
+def give_back(canvas: Canvas) -> None:
+    """Keep the memory of a canvas that nobody reads any more for the next one."""
+    canvas.keys[canvas.touched] = 0
+    _SPARE.keys = canvas.keys if canvas.keys.base is None else canvas.keys.base
 
 
 def least_keys(canvas: Canvas) -> IntArray:
