@@ -144,9 +144,8 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     same = (a == b) & (b == c) & (a >= 0)
     inside, rest = np.flatnonzero(same), np.flatnonzero(~same)
     pairs = pairs_of(seen.vertices, scene.triangles, drawn[rest], seen.core, plan.cones)
-    sight = Sight(seen.vertices, scene.triangles, seen.cut)
     at_once = a[inside].astype(np.int64) << 32 | drawn[inside]
-    keys = np.concatenate((at_once, block_keys(pairs, sight, plan.rays, plan.blocks)))
+    keys = np.concatenate((at_once, block_keys(pairs, sight_of(plan, seen), plan.rays, plan.blocks)))
     keys.sort()
     return Share(
         keys=keys,
@@ -157,11 +156,11 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     )
 
 
-def join(scene: Scene, seen: Seen, shares: Iterable[Share], pairs: BlockPairs) -> Binned:
+def join(sight: Sight, shares: Iterable[Share], pairs: BlockPairs) -> Binned:
     """The frame, when all its shares are done; `pairs` are those of all shares."""
     shares = list(shares)
     return Binned(
-        sight=Sight(seen.vertices, scene.triangles, seen.cut),
+        sight=sight,
         pairs=pairs,
         triangles=sum(share.triangles for share in shares),
         reaching=sum(share.reaching for share in shares),
@@ -175,7 +174,12 @@ def bin_frame(plan: BinPlan) -> Binned:
     seen = unseen(plan.scene)
     see_vertices(plan, slice(0, len(seen.vertices)), seen)
     share = bin_share(plan, slice(0, len(seen.cut)), seen)
-    return join(plan.scene, seen, [share], pairs_by_block([share.keys], plan.blocks))
+    return join(sight_of(plan, seen), [share], pairs_by_block([share.keys], plan.blocks))
+
+
+def sight_of(plan: BinPlan, seen: Seen) -> Sight:
+    """The scene from the eye, as far as it has been seen."""
+    return Sight(seen.vertices, plan.scene.triangles, seen.cut, plan.culling)
 
 
 def faces_eye(planes: FloatArray, eye: FloatArray) -> BoolArray:

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.binframe import Binned, BinPlan, Seen, Share, bin_frame, bin_share, join, see_vertices
+from quiltcli.binframe import Binned, BinPlan, Seen, Share, bin_frame, bin_share, join, see_vertices, sight_of
 from quiltcli.channels import exr_channels
 from quiltcli.draw import Buffers, Stage, Threads, clear_blocks, draw_batch, plan_of
 from quiltcli.errors import CheckFailedError, Problem
@@ -218,7 +218,9 @@ class Pool:
         shares = self._share_out(_Item("bin", (number, part)) for number, part in enumerate(parts))
         if None in shares:
             return bin_frame(plan_of(self._stage, viewer, rays))
-        return join(self._stage.scene, seen, shares, arena.frame_pairs())
+        culling = self._stage.job.render.backface_culling
+        sight = Sight(seen.vertices, self._stage.scene.triangles, seen.cut, culling)
+        return join(sight, shares, arena.frame_pairs())
 
     def clear(self, blocks: NDArray[np.int64], buffers: Buffers) -> None:
         """Empty the pixels of blocks in one of the pool's buffers."""
@@ -310,7 +312,7 @@ class _Workplace:
         """Draw a batch; its visible pixels."""
         if self._frame is None:
             seen, plan, stage = self._arena.seen, self.plan, self._stage
-            sight = Sight(seen.vertices, stage.scene.triangles, seen.cut)
+            sight = sight_of(plan, seen)
             pairs = self._arena.frame_pairs()
             self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs)
         return draw_batch(self._stage, self._frame, batch, self._buffers[index], stale)

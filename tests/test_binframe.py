@@ -10,7 +10,7 @@ import pytest
 from ballstage import ball_scene, stage_of_facets
 from rig import cube, viewer
 
-from quiltcli.binframe import bin_frame, bin_share, join, see_vertices, unseen
+from quiltcli.binframe import bin_frame, bin_share, join, see_vertices, sight_of, unseen
 from quiltcli.display import lit_facets
 from quiltcli.draw import plan_of
 from quiltcli.homography import quilt_rays
@@ -35,7 +35,7 @@ def test_shares_together_have_the_pairs_of_the_whole(culling, depth):
     ends = [0, 3, 500, 501, len(stage.scene.triangles)]
     shares = [bin_share(plan, slice(*part), seen) for part in pairwise(ends)]
     pairs = pairs_by_block([share.keys for share in shares], stage.blocks)
-    found = join(stage.scene, seen, shares, pairs)
+    found = join(sight_of(plan, seen), shares, pairs)
     assert whole.sight.cut.any()
     assert whole.triangles < len(stage.scene.triangles)
     np.testing.assert_array_equal(found.sight.cut, whole.sight.cut)

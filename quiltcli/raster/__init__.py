@@ -135,7 +135,9 @@ def rasterize(
     wanted: Wanted | None = None,
 ) -> Iterator[Hits]:
     """What the pixels of one batch see; `wanted` is what the hits shall tell. See `draw`."""
-    return draw(frame, batch, sample).hits(wanted or Wanted())
+    drawing = draw(frame, batch, sample)
+    yield from drawing.hits(wanted or Wanted())
+    drawing.done()
 
 
 def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.0, 0.0)) -> Drawing:
@@ -164,6 +166,7 @@ def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
     spans = large_spans(large, canvas, by)
     covering = covering_keys(large, spans, canvas, bits)
-    draw_small(pairs, np.flatnonzero(some & small), table, canvas, limits, bits, by, covering)
+    rows, culled = np.flatnonzero(some & small), frame.sight.culled
+    draw_small(pairs, rows, table, canvas, limits, bits, by, covering, culled=culled)
     draw_large(large, spans, covering, canvas, limits, bits, by)
     return Drawing(frame.blocks, canvas, table, limits, bits)

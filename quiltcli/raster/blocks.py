@@ -204,6 +204,7 @@ class Canvas:
         used: (M,) microtiles that have pixels of their facet; nothing needs to be drawn in others.
         keys: (M, 64) int64 depth keys, 0 where nothing has been drawn.
         touched: (M,) microtiles that have keys.
+        full: (M,) those of them that are known to have nothing but keys.
         filler: (M,) one more than the serial of the one pair that shows in a microtile, fills it and
             so needs no keys; 0 where there is none.
     """
@@ -216,6 +217,7 @@ class Canvas:
     used: BoolArray
     keys: IntArray
     touched: BoolArray
+    full: BoolArray
     filler: IntArray
 
 
@@ -236,6 +238,7 @@ def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
         used=blocks.used.take(number),
         keys=_empty_keys(count),
         touched=np.zeros(count, dtype=np.bool_),
+        full=np.zeros(count, dtype=np.bool_),
         filler=np.zeros(count, dtype=np.int64),
     )
 

@@ -116,7 +116,9 @@ def draw_large(
         Number of pixels that were evaluated.
     """
     if by is None:
-        nearest = depth_part(np.maximum(least_keys(canvas), covering), bits)
+        least = least_keys(canvas)
+        np.greater(least, 0, out=canvas.full)
+        nearest = depth_part(np.maximum(least, covering), bits)
         spans = spans.take(np.flatnonzero(spans.greatest >= nearest.take(spans.tile)))
         spans = _fill(planes, spans, canvas)
     _draw_rounds(planes, spans, canvas, limits, bits, by)

@@ -30,11 +30,13 @@ class Sight:
         vertices: (V, 3) world minus eye, metres.
         triangles: (T, 3).
         cut: (T,) triangles that reach beyond the near or far depth.
+        culled: whether triangles that face away have been left out.
     """
 
     vertices: FloatArray
     triangles: Int32Array
     cut: BoolArray
+    culled: bool = False
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,8 @@ def draw_small(
     bits: int,
     by: BatchOrder | None = None,
     covering: IntArray | None = None,
+    *,
+    culled: bool = False,
 ) -> int:
     """Draw pairs whose boxes are at most LIMIT pixels wide and high.
 
@@ -75,6 +77,7 @@ def draw_small(
         bits: bits of the serial in a key.
         by: what to order by instead of 1/t.
         covering: (M,) keys that every pixel of a microtile will have at least; pairs behind are left out.
+        culled: whether none of them faces away.
 
     Returns:
         Number of candidate pixels that were evaluated.
@@ -82,7 +85,9 @@ def draw_small(
     if covering is not None and by is None and np.count_nonzero(covering) * _SOME > covering.size:
         rows = rows[~_hidden(pairs, rows, covering, canvas, bits)]
     classes = size_classes(pairs, rows)
-    behind = seen_from_behind(pairs.corners, limits.handed.take(pairs.block)).take(rows)
+    behind = np.zeros(rows.size, dtype=np.bool_)
+    if not culled:
+        behind = seen_from_behind(pairs.corners, limits.handed.take(pairs.block)).take(rows)
     order = np.argsort(classes + behind * np.uint16(2 * _SHAPES), kind="stable")
     turn = order.size - int(np.count_nonzero(behind))
     candidates = 0

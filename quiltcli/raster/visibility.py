@@ -149,7 +149,7 @@ def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: BoolArray) -> Iterator
         wanted: (K,) the blocks of the canvas that are asked about.
     """
     place, _ = segments(canvas.tile_start)
-    bare = np.flatnonzero(canvas.used & (canvas.filler == 0) & wanted[place])
+    bare = np.flatnonzero(canvas.used & (canvas.filler == 0) & ~canvas.full & wanted[place])
     tiles = _tiles(canvas, blocks, bare)
     empty = tiles.interior & ~canvas.touched[bare]
     for part in _parts(np.flatnonzero(empty), _WHOLE):
