@@ -126,7 +126,7 @@ def see_vertices(plan: BinPlan, part: slice, seen: Seen) -> None:
     vertices = np.subtract(plan.scene.vertices[part], plan.viewer.eye, out=seen.vertices[part])
     seen.depth[part] = plan.viewer.depth_of(vertices.T)
     core = seen.core[part] = plan.cores.met_by(vertices)
-    facet = np.append(plan.cones.facet, np.int32(-1)).take(core)
+    facet = np.append(plan.cones.whole_facet, np.int32(-1)).take(core)
     seen.block[part] = vertex_blocks(vertices, facet, plan.rays, plan.blocks)
 
 
@@ -145,7 +145,8 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     inside, rest = np.flatnonzero(same), np.flatnonzero(~same)
     pairs = pairs_of(seen.vertices, scene.triangles, drawn[rest], seen.core, plan.cones)
     at_once = a[inside].astype(np.int64) << 32 | drawn[inside]
-    keys = np.concatenate((at_once, block_keys(pairs, sight_of(plan, seen), plan.rays, plan.blocks)))
+    sight = sight_of(scene, seen, culling=plan.culling)
+    keys = np.concatenate((at_once, block_keys(pairs, sight, plan.rays, plan.blocks)))
     keys.sort()
     return Share(
         keys=keys,
@@ -174,12 +175,14 @@ def bin_frame(plan: BinPlan) -> Binned:
     seen = unseen(plan.scene)
     see_vertices(plan, slice(0, len(seen.vertices)), seen)
     share = bin_share(plan, slice(0, len(seen.cut)), seen)
-    return join(sight_of(plan, seen), [share], pairs_by_block([share.keys], plan.blocks))
+    return join(
+        sight_of(plan.scene, seen, culling=plan.culling), [share], pairs_by_block([share.keys], plan.blocks)
+    )
 
 
-def sight_of(plan: BinPlan, seen: Seen) -> Sight:
+def sight_of(scene: Scene, seen: Seen, *, culling: bool) -> Sight:
     """The scene from the eye, as far as it has been seen."""
-    return Sight(seen.vertices, plan.scene.triangles, seen.cut, plan.culling)
+    return Sight(seen.vertices, scene.triangles, seen.cut, culling)
 
 
 def faces_eye(planes: FloatArray, eye: FloatArray) -> BoolArray:

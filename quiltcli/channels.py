@@ -29,8 +29,8 @@ class Channel:
         layers: names of its EXR channels.
         dtype: their pixel type.
         empty: value of a pixel that sees nothing.
-        values: from scene, viewer and hits to an array for each layer, (G, k), or (G, 1) where a group's
-            pixels all have one value, of any float or integer type.
+        values: from scene, viewer and hits to an array for each layer, (G, k), (G, 1) where a group's
+            pixels all have one value, or (1, 1) where all have, of any float or integer type.
         wanted: what of the hits that takes beside triangle and depth.
     """
 
@@ -81,7 +81,7 @@ def _point(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
     return hits.position + viewer.eye[:, None, None]
 
 
-_MOST_HALF_BITS = np.uint32(MOST_HALF.astype(np.float16).view(np.uint16))
+_MOST_SCALED = MOST_HALF * np.float32(2.0**-112)
 _HALF, _FLOAT, _UINT = np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.uint32)
 
 # Depths are measured in double precision and rounded once. A pixel that sees nothing is infinitely
@@ -137,8 +137,9 @@ def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
     A product with 2⁻¹¹² has the exponent of a half float, small ones denormal as theirs are; then the
     bits that a half float lacks are rounded away. `astype` would take five times as long.
     """
-    bits = (values * np.float32(2.0**-112)).view(np.uint32)
+    scaled = values * np.float32(2.0**-112)
+    np.minimum(scaled, _MOST_SCALED, out=scaled)
+    bits = scaled.view(np.uint32)
     bits += np.uint32(0x1000)
     bits >>= np.uint32(13)
-    np.minimum(bits, _MOST_HALF_BITS, out=bits)
     return bits.astype(np.uint16).view(np.float16)

@@ -31,7 +31,7 @@ from quiltcli.draw import Buffers, Stage, Threads, clear_blocks, draw_batch, pla
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
 from quiltcli.homography import QuiltRays, quilt_rays
-from quiltcli.raster import BlockPairs, Frame, Sight, pairs_by_block
+from quiltcli.raster import BlockPairs, Frame, pairs_by_block
 from quiltcli.viewer import Viewer
 
 _ROOM = 8  # pairs a triangle there is room for; memory that is not touched costs nothing
@@ -218,8 +218,7 @@ class Pool:
         shares = self._share_out(_Item("bin", (number, part)) for number, part in enumerate(parts))
         if None in shares:
             return bin_frame(plan_of(self._stage, viewer, rays))
-        culling = self._stage.job.render.backface_culling
-        sight = Sight(seen.vertices, self._stage.scene.triangles, seen.cut, culling)
+        sight = sight_of(self._stage.scene, seen, culling=self._stage.job.render.backface_culling)
         return join(sight, shares, arena.frame_pairs())
 
     def clear(self, blocks: NDArray[np.int64], buffers: Buffers) -> None:
@@ -312,7 +311,7 @@ class _Workplace:
         """Draw a batch; its visible pixels."""
         if self._frame is None:
             seen, plan, stage = self._arena.seen, self.plan, self._stage
-            sight = sight_of(plan, seen)
+            sight = sight_of(stage.scene, seen, culling=plan.culling)
             pairs = self._arena.frame_pairs()
             self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs)
         return draw_batch(self._stage, self._frame, batch, self._buffers[index], stale)

@@ -71,7 +71,7 @@ class _Points:
 
     Attributes:
         normal: shading normals on the side of the eye.
-        normal_scale: (n, k) or (n, 1) one over their lengths.
+        normal_scale: (n, k), (n, 1) or (1, 1) one over their lengths.
         ray: directions from the eye.
         ray_scale: (n, k) one over their lengths, negative: towards the eye; None where nobody asks for it.
         base: 3 values, base colour.
@@ -100,7 +100,7 @@ def shading_wants(scene: Scene) -> Wanted:
 
 
 def shade(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]:
-    """Linear red, green and blue of every hit, (G, k) float32 each, or (G, 1) where groups have one colour.
+    """Linear red, green and blue of every hit: (G, k), (G, 1) one a group, or (1, 1) one for all, float32.
 
     Args:
         scene: the scene.
@@ -131,7 +131,7 @@ def shade(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]
 
 
 def shading_normals(hits: Hits) -> Float32Array:
-    """Unit normals (3, G, k) float32 as shading uses them: interpolated, on the side of the eye."""
+    """Unit normals (3, G, k), or (3, 1, 1) one for all, as shading uses them: on the side of the eye."""
     assert hits.normal is not None
     return np.multiply(vector_values(hits.normal), _over_length(hits.normal))
 

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from ballstage import ball_scene, stage_of_facets
-from rig import cube, viewer
+from rig import cube, display, viewer
+from wallscene import lights, wall
 
 from quiltcli.binframe import bin_frame, bin_share, join, see_vertices, sight_of, unseen
 from quiltcli.display import lit_facets
-from quiltcli.draw import plan_of
+from quiltcli.draw import draw_frame, new_buffers, plan_of
 from quiltcli.homography import quilt_rays
 from quiltcli.raster import pairs_by_block
 from quiltcli.raster.prewarp import triangles_of
@@ -35,7 +36,7 @@ def test_shares_together_have_the_pairs_of_the_whole(culling, depth):
     ends = [0, 3, 500, 501, len(stage.scene.triangles)]
     shares = [bin_share(plan, slice(*part), seen) for part in pairwise(ends)]
     pairs = pairs_by_block([share.keys for share in shares], stage.blocks)
-    found = join(sight_of(plan, seen), shares, pairs)
+    found = join(sight_of(stage.scene, seen, culling=culling), shares, pairs)
     assert whole.sight.cut.any()
     assert whole.triangles < len(stage.scene.triangles)
     np.testing.assert_array_equal(found.sight.cut, whole.sight.cut)
@@ -71,3 +72,19 @@ def test_triangles_well_inside_a_block_are_found_where_their_boxes_are(density):
     more = np.setdiff1d(quick.keys, slow.keys)
     assert not np.isin(triangles_of(more), triangles_of(slow.keys)).any()
     assert more.size < 0.2 * slow.keys.size
+
+
+@pytest.mark.parametrize("density", [60, 600])
+def test_a_triangle_across_a_notch_is_seen_in_the_notch(density):
+    """Of a facet that is not convex, corners in its arms do not tell what is between them."""
+    corners = [(-1, -1), (1, -1), (1, 1), (0.4, 1), (0.4, -0.4), (-0.4, -0.4), (-0.4, 1), (-1, 1)]
+    plug = [(-0.38, -0.38), (0.38, -0.38), (0.38, 1), (-0.38, 1)]
+    facets = display([(x, y, 0.0) for x, y in corners + plug], [list(range(8)), [8, 9, 10, 11]], density)
+    bar = np.array([(-0.7, 0.5, -0.5), (0.7, 0.5, -0.5), (0.7, 0.6, -0.5)])
+    scene = replace(wall(lights(ambient=(1, 1, 1))), vertices=bar)
+    stage = stage_of_facets(facets, scene)
+    buffers = new_buffers(stage)
+    draw_frame(stage, viewer((0, 0, 3)), buffers)
+    seen = np.isfinite(buffers["Z"])
+    for facet in (1, 2):
+        assert np.count_nonzero(seen & (stage.owners == facet)) > 20

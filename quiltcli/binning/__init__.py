@@ -69,10 +69,11 @@ def pairs_of(
     # Of very many, a triangle with few candidates is small: its own edges would reject next to nothing.
     few = _FEW if len(triangles) > _MANY else 0
     keys = [_key(cones.facet.take(a[settled]), drawn[settled])]
-    reached = np.zeros(len(triangles), dtype=np.bool_)
-    for triangle, part in _second_pass(vertices, triangles, drawn[rest], cones, few):
-        keys.append(_key(cones.facet.take(part), triangle))
-        reached[triangle] = True
+    reached = np.zeros(rest.size, dtype=np.bool_)
+    rest = drawn[rest]
+    for place, part in _second_pass(vertices, triangles, rest, cones, few):
+        keys.append(_key(cones.facet.take(part), rest.take(place)))
+        reached[place] = True
     found = np.concatenate(keys)
     found.sort()
     if cones.facet.size > np.unique(cones.facet).size:  # a facet of several parts may meet with more than one
@@ -114,13 +115,13 @@ class Cores:
 def _second_pass(
     vertices: FloatArray, triangles: Int32Array, rest: IntArray, cones: Cones, few: int
 ) -> Iterator[tuple[IntArray, IntArray]]:
-    """Triangles and parts that the exact cone test finds for those the first pass left."""
+    """Places in `rest`, the triangles that the first pass left, and the parts that the cone test finds."""
     for at in range(0, rest.size, _CHUNK):
         chunk = rest[at : at + _CHUNK]
         corners = gather_corners(vertices, triangles.take(chunk, axis=0))
         first, second = candidate_pairs(corners, cones.grids)
         meets = overlapping(corners, cones.planes, cones.wide, first, second, few)
-        yield chunk.take(first[meets]), second[meets]
+        yield at + first[meets], second[meets]
 
 
 def _key(facet: Int32Array, triangle: IntArray) -> IntArray:

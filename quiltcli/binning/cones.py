@@ -55,6 +55,12 @@ class Cones:
     planes: FloatArray
 
     @cached_property
+    def whole_facet(self) -> Int32Array:
+        """The facet (K,) of parts that are all of their facet, which is convex then; −1 for other parts."""
+        several = np.bincount(self.facet, minlength=1)[self.facet] > 1
+        return np.where(several, np.int32(-1), self.facet)
+
+    @cached_property
     def grids(self) -> ConeGrids:
         """The grown parts, sorted in for the broad phase."""
         return ConeGrids(self.wide)

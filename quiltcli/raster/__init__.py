@@ -165,7 +165,7 @@ def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.
     large = table.add(pairs, np.flatnonzero(some & ~small)).compact()
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
     spans = large_spans(large, canvas, by)
-    covering = covering_keys(large, spans, canvas, bits)
+    covering = covering_keys(large, spans, canvas, bits) if by is None else None
     rows, culled = np.flatnonzero(some & small), frame.sight.culled
     draw_small(pairs, rows, table, canvas, limits, bits, by, covering, culled=culled)
     draw_large(large, spans, covering, canvas, limits, bits, by)

@@ -110,8 +110,10 @@ class Hits:
         return self.places.pixel
 
     def drawn(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values (P,) of the drawn pixels, of values (G, k), or (G, 1) for whole groups."""
+        """Values (P,) of the drawn pixels, of values (G, k), (G, 1) for whole groups, or (1, 1) for all."""
         k = self.depth.shape[1]
+        if values.size == 1:
+            values = np.broadcast_to(values, (len(self.depth), 1))
         index = self.chosen
         if values.shape[1] < k:
             index = np.arange(values.size * k) // k if index is None else index // k

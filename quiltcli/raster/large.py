@@ -95,7 +95,7 @@ def covering_keys(planes: Planes, spans: Spans, canvas: Canvas, bits: int) -> In
 def draw_large(
     planes: Planes,
     spans: Spans,
-    covering: IntArray,
+    covering: IntArray | None,
     canvas: Canvas,
     limits: DepthRange,
     bits: int,
@@ -106,7 +106,7 @@ def draw_large(
     Args:
         planes: the pairs.
         spans: from `large_spans`.
-        covering: from `covering_keys`.
+        covering: from `covering_keys`; None with `by`.
         canvas: what smaller pairs have left; its keys are raised, and microtiles that one pair fills noted.
         limits: near and far, for pairs that reach beyond them.
         bits: bits of the serial in a key.
@@ -115,7 +115,7 @@ def draw_large(
     Returns:
         Number of pixels that were evaluated.
     """
-    if by is None:
+    if covering is not None:
         least = least_keys(canvas)
         np.greater(least, 0, out=canvas.full)
         nearest = depth_part(np.maximum(least, covering), bits)

@@ -108,23 +108,23 @@ def block_keys(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> I
 def vertex_blocks(vertices: FloatArray, facet: Int32Array, rays: QuiltRays, blocks: Blocks) -> Int32Array:
     """The blocks (n,) that vertices lie well inside of, −1 where there is none.
 
-    A triangle all of whose corners have the same block needs no other, for what is well inside is convex.
+    A triangle all of whose corners have the same block needs no other: facet and block are convex.
 
     Args:
         vertices: (n, 3) minus the eye.
-        facet: (n,) the facet that shows each vertex and what is about it, −1 for none.
+        facet: (n,) the convex facet that alone shows each vertex and what is about it, −1 for none.
         rays: rays through the quilt.
         blocks: the blocks.
     """
     result = np.full(facet.size, -1, dtype=np.int32)
     count = np.diff(blocks.start)
     known = np.flatnonzero(facet >= 0)
-    several = count.take(facet[known]) > 1
-    alone, known = known[~several], known[several]
+    mine = count.take(facet[known])
+    alone, known = known[mine == 1], known[mine > 1]
     result[alone] = blocks.start.take(facet[alone])
     if not known.size:
         return result
-    first = np.where(count > 0, blocks.start[:-1], 0)  # facets that have no place are never asked about
+    first = np.where(count > 0, blocks.start[:-1], 0)  # nobody asks about facets without blocks
     last = first + np.maximum(count, 1) - 1
     matrices = np.ascontiguousarray(block_matrices(rays, blocks, first, (0.0, 0.0)).transpose(1, 2, 0))
     width = blocks.x0[last] + blocks.width[last] - blocks.x0[first]

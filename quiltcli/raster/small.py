@@ -76,13 +76,14 @@ def draw_small(
         limits: near and far, for pairs that reach beyond them.
         bits: bits of the serial in a key.
         by: what to order by instead of 1/t.
-        covering: (M,) keys that every pixel of a microtile will have at least; pairs behind are left out.
+        covering: (M,) keys that every pixel of a microtile will have at least; pairs behind are left out;
+            None with `by`.
         culled: whether none of them faces away.
 
     Returns:
         Number of candidate pixels that were evaluated.
     """
-    if covering is not None and by is None and np.count_nonzero(covering) * _SOME > covering.size:
+    if covering is not None and np.count_nonzero(covering) * _SOME > covering.size:
         rows = rows[~_hidden(pairs, rows, covering, canvas, bits)]
     classes = size_classes(pairs, rows)
     behind = np.zeros(rows.size, dtype=np.bool_)

@@ -28,7 +28,7 @@ _ROUND_TO = {3: 6.0, 6: 12.0}
 
 @dataclass(frozen=True)
 class PointVectors:
-    """Vectors that are known one by one: values (3, G, k) float32, or (3, G, 1) one for each group."""
+    """Vectors that are known one by one: values (3, G, k) float32, (3, G, 1) one a group, or (3, 1, 1)."""
 
     values: Float32Array
 
