@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.binning import Cones, Cores, Parts, lit_cones, pairs_of
+from quiltcli.binning import Cones, Cores, Parts, common_value, lit_cones, pairs_of
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
 from quiltcli.homography import QuiltRays
 from quiltcli.raster import (
@@ -139,12 +139,10 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
         wanted &= faces_eye(scene.planes[:, part], eye)
     drawn = np.flatnonzero(wanted)
     drawn += part.start
-    corner = scene.triangles if drawn.size == len(scene.triangles) else scene.triangles.take(drawn, axis=0)
-    a, b, c = (seen.block.take(corner[:, k]) for k in range(3))
-    same = (a == b) & (b == c) & (a >= 0)
-    inside, rest = np.flatnonzero(same), np.flatnonzero(~same)
+    block = common_value(seen.block, scene.triangles, drawn)
+    inside, rest = np.flatnonzero(block >= 0), np.flatnonzero(block < 0)
     pairs = pairs_of(seen.vertices, scene.triangles, drawn[rest], seen.core, plan.cones)
-    at_once = a[inside].astype(np.int64) << 32 | drawn[inside]
+    at_once = block[inside].astype(np.int64) << 32 | drawn[inside]
     sight = sight_of(scene, seen, culling=plan.culling)
     keys = np.concatenate((at_once, block_keys(pairs, sight, plan.rays, plan.blocks)))
     keys.sort()

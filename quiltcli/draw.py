@@ -29,6 +29,7 @@ from quiltcli.orders import DepthOrder, depth_order
 from quiltcli.packing import layout_for
 from quiltcli.raster import (
     Blocks,
+    Drawing,
     Frame,
     Hits,
     batches,
@@ -296,9 +297,8 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
         wanted = replace(wanted, position=True)
     visible = 0
     drawing = draw(frame, batch)
-    for places in drawing.missed(np.flatnonzero(stale) + batch[0]) if stale.any() else ():
-        for name, value in empty_values(stage).items():
-            places.put(buffers[name], np.full(1, value, dtype=buffers[name].dtype))
+    if stale.any():
+        empty_missed(stage, drawing, np.flatnonzero(stale) + batch[0], buffers)
     for hits in drawing.hits(wanted):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
         if frame.order is not None:
@@ -306,6 +306,14 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
         visible += hits.inside
     drawing.done()
     return visible
+
+
+def empty_missed(stage: Stage, drawing: Drawing, block: IntArray, buffers: Buffers) -> None:
+    """Empty the pixels of these blocks at which the drawing shows nothing."""
+    empty = {name: np.full(1, value, buffers[name].dtype) for name, value in empty_values(stage).items()}
+    for places in drawing.missed(block):
+        for name, value in empty.items():
+            places.put(buffers[name], value)
 
 
 def ordered(stage: Stage, frame: Frame) -> Frame:

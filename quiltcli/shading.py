@@ -146,10 +146,10 @@ def _points(scene: Scene, hits: Hits) -> _Points:
         base = tuple(v * c for v, c in zip(base, color, strict=True))
         ambient = tuple(v * c for v, c in zip(ambient, color, strict=True))
     normal_scale = _over_length(hits.normal)
-    ray_scale = layer = None
-    if np.any(specular90) or scene.lights.headlight:
-        ray_scale = _over_length(hits.ray, -_ONE)
-    if np.any(specular90) and ray_scale is not None:
+    shiny = bool(np.any(specular90))
+    ray_scale = _over_length(hits.ray, -_ONE) if shiny or scene.lights.headlight else None
+    layer = None
+    if shiny and ray_scale is not None:
         nv = products(hits.normal, hits.ray)
         nv *= normal_scale
         nv *= ray_scale

@@ -23,6 +23,7 @@ __all__ = [
     "Cores",
     "Pairs",
     "Parts",
+    "common_value",
     "facet_parts",
     "lit_cones",
     "pairs_of",
@@ -62,13 +63,11 @@ def pairs_of(
         core: (V,) the cores that the vertices' rays meet, by `Cores.met_by`.
         cones: of the lit parts of the display, as this eye sees them.
     """
-    corner = triangles if drawn.size == len(triangles) else triangles.take(drawn, axis=0)
-    a, b, c = (core.take(corner[:, k]) for k in range(3))
-    same = (a == b) & (b == c) & (a >= 0)
-    settled, rest = np.flatnonzero(same), np.flatnonzero(~same)
+    met = common_value(core, triangles, drawn)
+    settled, rest = np.flatnonzero(met >= 0), np.flatnonzero(met < 0)
     # Of very many, a triangle with few candidates is small: its own edges would reject next to nothing.
     few = _FEW if len(triangles) > _MANY else 0
-    keys = [_key(cones.facet.take(a[settled]), drawn[settled])]
+    keys = [_key(cones.facet.take(met[settled]), drawn[settled])]
     reached = np.zeros(rest.size, dtype=np.bool_)
     rest = drawn[rest]
     for place, part in _second_pass(vertices, triangles, rest, cones, few):
@@ -84,6 +83,22 @@ def pairs_of(
         settled=settled.size,
         reaching=settled.size + int(np.count_nonzero(reached)),
     )
+
+
+def common_value(values: Int32Array, triangles: Int32Array, drawn: IntArray) -> Int32Array:
+    """What the three corners of triangles agree on.
+
+    Args:
+        values: (V,) a number of every vertex, negative for none.
+        triangles: (T, 3).
+        drawn: (D,) the triangles that are asked about.
+
+    Returns:
+        (D,) the number of all three corners, −1 where they differ or have none.
+    """
+    corner = triangles if drawn.size == len(triangles) else triangles.take(drawn, axis=0)
+    a, b, c = (values.take(corner[:, k]) for k in range(3))
+    return np.where((a == b) & (b == c) & (a >= 0), a, np.int32(-1))
 
 
 class Cores:

@@ -3,7 +3,7 @@
 The stages, in order: `blocks` cuts the facets' rectangles into pieces that fit the cache; `prewarp`
 gives each pair of binning to its blocks and finds its pixels there; `small` and `large` make `planes`
 of the pairs and raise the depth `keys` of a canvas; `visibility` reads from the canvas which `surfaces`
-its pixels see, and where.
+its microtiles or single `pixels` see, and `tiles` knows where those are.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ from quiltcli.raster.prewarp import (
     warp,
 )
 from quiltcli.raster.small import LIMIT, draw_small
-from quiltcli.raster.visibility import missed_pixels, read_canvas
+from quiltcli.raster.tiles import missed_pixels
+from quiltcli.raster.visibility import read_canvas
 from quiltcli.viewer import Viewer
 
 __all__ = [

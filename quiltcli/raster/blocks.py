@@ -200,6 +200,7 @@ class Canvas:
         tile_start: (K+1,) offsets of every block's microtiles.
         tiles_across: (K,) microtiles from left to right in a block.
         tiles_down: (K,) from top to bottom.
+        place: (M,) every microtile's block, by its place in the batch.
         number: (M,) every microtile's index among those of all blocks.
         used: (M,) microtiles that have pixels of their facet; nothing needs to be drawn in others.
         keys: (M, 64) int64 depth keys, 0 where nothing has been drawn.
@@ -213,6 +214,7 @@ class Canvas:
     tile_start: IntArray
     tiles_across: IntArray
     tiles_down: IntArray
+    place: IntArray
     number: IntArray
     used: BoolArray
     keys: IntArray
@@ -234,6 +236,7 @@ def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
         tile_start=tile_start,
         tiles_across=across,
         tiles_down=tiles // across,
+        place=place,
         number=number,
         used=blocks.used.take(number),
         keys=_empty_keys(count),

@@ -19,7 +19,7 @@ from quiltcli.raster.blocks import SIDE, Canvas, least_keys
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.keys import depth_part, make_keys, serial_part
 from quiltcli.raster.order import BatchOrder
-from quiltcli.raster.planes import Planes
+from quiltcli.raster.planes import Planes, moved
 from quiltcli.raster.vectors import BASIS
 
 MICROTILE = 8
@@ -335,8 +335,7 @@ def _tile_keys(
 
     def values(plane: FloatArray) -> FloatArray:
         # Exact whatever the order of the sums: the planes lie on dyadic grids.
-        local = np.take(plane, row, axis=1)
-        local[2] += local[0] * x + local[1] * y
+        local = moved(np.take(plane, row, axis=1), x, y)
         result: FloatArray = local.T.copy() @ BASIS
         return result
 

@@ -221,6 +221,12 @@ def _cross(a: FloatArray, b: FloatArray, result: FloatArray) -> None:
         result[k] -= np.multiply(a[j], b[i], out=part)
 
 
+def moved(plane: FloatArray, x: NDArray[Any], y: NDArray[Any]) -> FloatArray:
+    """Planes (..., 3, N) made to begin at x, y (N,), in place; exact for what lies on dyadic grids."""
+    plane[..., 2, :] += plane[..., 0, :] * x + plane[..., 1, :] * y
+    return plane
+
+
 def power_of_two(x: NDArray[Any]) -> FloatArray:
     """The largest power of two not above `x` > 0; 0 for 0."""
     result: FloatArray = (x.view(np.int64) & _EXPONENT).view(np.float64)

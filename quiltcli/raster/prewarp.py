@@ -127,8 +127,7 @@ def vertex_blocks(vertices: FloatArray, facet: Int32Array, rays: QuiltRays, bloc
     first = np.where(count > 0, blocks.start[:-1], 0)  # nobody asks about facets without blocks
     last = first + np.maximum(count, 1) - 1
     matrices = np.ascontiguousarray(block_matrices(rays, blocks, first, (0.0, 0.0)).transpose(1, 2, 0))
-    width = blocks.x0[last] + blocks.width[last] - blocks.x0[first]
-    height = blocks.y0[last] + blocks.height[last] - blocks.y0[first]
+    width, height = _extent(blocks, first, last)
     for at in range(0, known.size, _CHUNK):
         some = known[at : at + _CHUNK]
         of = facet.take(some)
@@ -139,6 +138,13 @@ def vertex_blocks(vertices: FloatArray, facet: Int32Array, rays: QuiltRays, bloc
         block = first.take(of) + top * blocks.columns.take(of) + left
         result[some] = np.where((left == right) & (top == bottom), block, -1)
     return result
+
+
+def _extent(blocks: Blocks, first: IntArray, last: IntArray) -> tuple[IntArray, IntArray]:
+    """Width and height (n,), in pixels, of what reaches from the first blocks (n,) to the last ones."""
+    width: IntArray = blocks.x0[last] + blocks.width[last] - blocks.x0[first]
+    height: IntArray = blocks.y0[last] + blocks.height[last] - blocks.y0[first]
+    return width, height
 
 
 def _cells_about(pixel: FloatArray, extent: IntArray) -> tuple[IntArray, IntArray]:
@@ -168,8 +174,7 @@ def _blocks_under(
     """Blocks (S,) that the triangles' boxes touch, and whose box each is (S,)."""
     first, last = blocks.start[facet], blocks.start[facet + 1] - 1
     matrix = block_matrices(rays, blocks, first, (0.0, 0.0))
-    width = blocks.x0[last] + blocks.width[last] - blocks.x0[first]
-    height = blocks.y0[last] + blocks.height[last] - blocks.y0[first]
+    width, height = _extent(blocks, first, last)
     corners = gather_corners(sight.vertices, sight.triangles[triangle])
     homogeneous = project(corners, np.ascontiguousarray(matrix.transpose(1, 2, 0)), np.empty_like(corners))
     box = pixel_boxes(homogeneous, width, height)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.raster.hits import Wanted
-from quiltcli.raster.planes import Planes, power_of_two
+from quiltcli.raster.planes import Planes, moved, power_of_two
 from quiltcli.raster.vectors import PointVectors
 
 _NEAR = 8.0  # pixels, about as far as a surface's pixels are from where its planes begin
@@ -54,7 +54,7 @@ def surfaces(
     normal = np.zeros((0, 3, rows.size), dtype=np.float32)
     weights = np.zeros((0, 3, rows.size))
     if wanted.normals is not None or wanted.weights:
-        edge = _moved(np.take(planes.edge, rows, axis=2), x, y)
+        edge = moved(np.take(planes.edge, rows, axis=2), x, y)
         edge[0] += edge[1]
         edge[0] += edge[2]
         edge *= _facing(planes, rows, handed)
@@ -67,12 +67,6 @@ def surfaces(
         normal=normal,
         weights=weights,
     )
-
-
-def _moved(plane: FloatArray, x: NDArray[Any], y: NDArray[Any]) -> FloatArray:
-    """Planes (..., 3, n) made to begin at x, y (n,), in place; exact for what lies on dyadic grids."""
-    plane[..., 2, :] += plane[..., 0, :] * x + plane[..., 1, :] * y
-    return plane
 
 
 def _facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:

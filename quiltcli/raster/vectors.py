@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, IntArray
-from quiltcli.raster.planes import power_of_two
+from quiltcli.raster.planes import moved, power_of_two
 
 BASIS: FloatArray = np.stack((np.tile(np.arange(8.0), 8), np.repeat(np.arange(8.0), 8), np.ones(64)))
 """Column, row and 1 (3, 64) of the pixels of a microtile, whose 64 pixels are neighbours in memory."""
@@ -59,18 +59,18 @@ class BlockVectors:
     @cached_property
     def planes(self) -> FloatArray:
         """Planes (3, 3, G) from the microtiles' first pixels."""
-        return self._moved(np.take(self.matrix, self.block, axis=2))
+        return moved(np.take(self.matrix, self.block, axis=2), self.x, self.y)
 
     def along(self, direction: Float32Array | FloatArray) -> FloatArray:
         """Planes (3, G) of the products with one direction (3,)."""
-        return self._moved(_sum_of_products(self.matrix, direction).take(self.block, axis=1))
+        return moved(_sum_of_products(self.matrix, direction).take(self.block, axis=1), self.x, self.y)
 
     def onto(self, vectors: Float32Array) -> FloatArray:
         """Planes (3, G) of the products with vectors, (3, G, 1) one a microtile or (3, 1, 1) one for all."""
         if vectors.shape[1] == 1:
             return self.along(vectors[:, 0, 0])
         part = np.take(self.matrix, self.block, axis=2)
-        return self._moved(_sum_of_products(part, vectors[:, None, :, 0]))
+        return moved(_sum_of_products(part, vectors[:, None, :, 0]), self.x, self.y)
 
     @cached_property
     def squares(self) -> FloatArray:
@@ -80,11 +80,6 @@ class BlockVectors:
         x += 2 * xx * self.x + xy * self.y
         y += 2 * yy * self.y + xy * self.x
         return np.stack((xx, xy, yy, x, y, one))
-
-    def _moved(self, plane: FloatArray) -> FloatArray:
-        """Planes (..., 3, G) over blocks made to begin at the microtiles, in place."""
-        plane[..., 2, :] += plane[..., 0, :] * self.x + plane[..., 1, :] * self.y
-        return plane
 
 
 Vectors: TypeAlias = PointVectors | TileVectors | BlockVectors

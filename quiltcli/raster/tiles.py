@@ -1,0 +1,117 @@
+"""Where the microtiles of a canvas lie in the quilt, which of their pixels facets own, and which are bare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.geometry import BoolArray, Int32Array, IntArray
+from quiltcli.raster.blocks import Blocks, Canvas
+from quiltcli.raster.hits import RUN, Places
+
+_AT_A_TIME = 2048
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """Where n microtiles lie.
+
+    Attributes:
+        index: (n,) their index in the canvas.
+        block: (n,) place of the block in the batch.
+        x: (n,) first column in the block.
+        y: (n,) first row in the block.
+        address: (n,) quilt address of the first pixel.
+        stride: (n,) pixels from one row of the page to the next.
+        facet: (n,) facet index.
+        interior: (n,) those all of whose pixels lie in the facet.
+        number: (n,) their index among the microtiles of all blocks.
+    """
+
+    index: IntArray
+    block: IntArray
+    x: IntArray
+    y: IntArray
+    address: IntArray
+    stride: IntArray
+    facet: Int32Array
+    interior: BoolArray
+    number: IntArray
+
+    def take(self, rows: IntArray) -> Tiles:
+        """The microtiles with these indices."""
+        return Tiles(*(column.take(rows) for column in vars(self).values()))
+
+    def lines(self) -> IntArray:
+        """Quilt addresses (n, 8) of the first pixels of their rows."""
+        step = self.stride[:1, None] if (self.stride == self.stride[:1]).all() else self.stride[:, None]
+        result: IntArray = self.address[:, None] + step * np.arange(8)
+        return result
+
+    def places(self) -> Places:
+        """All of their pixels."""
+        return Places(self.lines().reshape(-1), RUN)
+
+
+def tiles_at(canvas: Canvas, blocks: Blocks, index: IntArray) -> Tiles:
+    """Where the microtiles of a canvas with these indices lie."""
+    place, number = canvas.place[index], canvas.number[index]
+    block = canvas.block[place]
+    row, column = np.divmod(number - blocks.tile_start[block], canvas.tiles_across[place])
+    x, y, stride = column * 8, row * 8, blocks.stride[block]
+    return Tiles(
+        index=index,
+        block=place,
+        x=x,
+        y=y,
+        address=blocks.address[block] + y * stride + x,
+        stride=stride,
+        facet=blocks.facet[block],
+        interior=blocks.interior[number],
+        number=number,
+    )
+
+
+def owned_pixels(blocks: Blocks, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, IntArray, int]:
+    """Those of the `drawn` pixels (n, 64) of microtiles that their facet owns.
+
+    Returns:
+        the pixels, counted through all microtiles; their quilt addresses; how many are no bleed.
+    """
+    owned, inside = (
+        np.unpackbits(bits.take(tiles.number, axis=0), axis=1).view(np.bool_)
+        for bits in (blocks.owned, blocks.inside)
+    )
+    drawn &= owned
+    inside &= drawn
+    pixel = np.flatnonzero(drawn)
+    address = tiles.lines().reshape(-1).take(pixel >> 3)
+    address += pixel & 7
+    return pixel, address, int(np.count_nonzero(inside))
+
+
+def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: BoolArray) -> Iterator[Places]:
+    """The pixels of facets at which nothing was drawn.
+
+    Args:
+        canvas: what was drawn.
+        blocks: the blocks.
+        wanted: (K,) the blocks of the canvas that are asked about.
+    """
+    bare = np.flatnonzero(canvas.used & (canvas.filler == 0) & ~canvas.full & wanted[canvas.place])
+    tiles = tiles_at(canvas, blocks, bare)
+    empty = tiles.interior & ~canvas.touched[bare]
+    for part in in_parts(np.flatnonzero(empty), _AT_A_TIME):
+        yield tiles.take(part).places()
+    for part in in_parts(np.flatnonzero(~empty), _AT_A_TIME):
+        some = tiles.take(part)
+        _, address, _ = owned_pixels(blocks, some, canvas.keys.take(some.index, axis=0) == 0)
+        yield Places(address, 1)
+
+
+def in_parts(rows: IntArray, step: int) -> Iterator[IntArray]:
+    """The rows, at most `step` at a time."""
+    for at in range(0, rows.size, step):
+        yield rows[at : at + step]
