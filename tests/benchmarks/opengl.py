@@ -127,6 +127,10 @@ class Quilt:
 
     def draw(self, shading: str, *, whole_mesh: bool = False) -> None:
         """Draw the frame and wait for its end: each facet its own triangles, or each the whole mesh."""
+        with self._context:  # of several contexts the one made last would get the commands
+            self._draw(shading, whole_mesh)
+
+    def _draw(self, shading: str, whole_mesh: bool) -> None:
         context, program = self._context, self._programs[shading]
         target = self._target
         target.use()
@@ -148,8 +152,9 @@ class Quilt:
 
     def read(self) -> None:
         """Bring colour and depth to the program's memory, as half floats and floats."""
-        self._target.read_into(self._colour, components=4, dtype="f2")
-        self._target.read_into(self._depth, components=1, attachment=-1, dtype="f4")
+        with self._context:
+            self._target.read_into(self._colour, components=4, dtype="f2")
+            self._target.read_into(self._depth, components=1, attachment=-1, dtype="f4")
 
     @property
     def depth(self) -> Float32Array:
