@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from quiltcli.geometry import FloatArray
 from quiltcli.raster.hits import Hits, Wanted
 from quiltcli.scene import Scene
-from quiltcli.shading import MOST_HALF, shade, shading_normals, shading_wants
+from quiltcli.shading import MOST_HALF, shading_normals, shading_wants
+from quiltcli.tileshading import pixel_colors
 from quiltcli.viewer import Viewer
 
 Values: TypeAlias = NDArray[Any]
@@ -48,8 +49,8 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
 
 
 def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Sequence[Values]:
-    colors = [half_floats(color) for color in shade(scene, viewer.eye, hits)]
-    return *colors, np.ones((1, 1), dtype=np.float16)
+    colors = [half_floats(color) for color in pixel_colors(scene, viewer.eye, hits)]
+    return *colors * (3 // len(colors)), np.ones((1, 1), dtype=np.float16)
 
 
 def _depth(scene: Scene, viewer: Viewer, hits: Hits) -> Values:

@@ -40,7 +40,8 @@ from quiltcli.raster import (
 )
 from quiltcli.report import FrameRecord
 from quiltcli.scene import Scene, load_scene
-from quiltcli.shading import MOST_HALF, shade, shading_wants
+from quiltcli.shading import MOST_HALF, shading_wants
+from quiltcli.tileshading import NodeShader, pixel_colors
 from quiltcli.viewer import Viewer
 
 Buffers = dict[str, NDArray[Any]]
@@ -299,7 +300,8 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
     drawing = draw(frame, batch)
     if stale.any():
         empty_missed(stage, drawing, np.flatnonzero(stale) + batch[0], buffers)
-    for hits in drawing.hits(wanted):
+    shader = NodeShader(stage.scene, frame.viewer.eye) if "rgba" in channels else None
+    for hits in drawing.hits(wanted, shader):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)
@@ -339,10 +341,12 @@ def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits) -> None:
 def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, samples: int) -> None:
     """Average the colour of several samples a pixel; what misses the scene counts as background."""
     found = []
+    scene, eye = stage.scene, frame.viewer.eye
     for sample in sample_places(samples):
-        for hits in rasterize(frame, batch, sample, shading_wants(stage.scene)):
+        for hits in rasterize(frame, batch, sample, shading_wants(scene), NodeShader(scene, eye)):
             rgba = np.ones((4, hits.depth.size), dtype=np.float32)
-            for color, mine in zip(shade(stage.scene, frame.viewer.eye, hits), rgba, strict=False):
+            colors = pixel_colors(scene, eye, hits)
+            for color, mine in zip(colors * (3 // len(colors)), rgba, strict=False):
                 np.minimum(color, MOST_HALF, out=mine.reshape(hits.depth.shape))
             found.append((hits.pixel, np.stack([hits.drawn(c.reshape(hits.depth.shape)) for c in rgba])))
     if not found or "rgba" not in stage.job.output.channels:

@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array
-from quiltcli.raster.hits import Hits, Wanted
+from quiltcli.raster.hits import Hits, Points, Wanted
 from quiltcli.raster.vectors import PointVectors, Vectors, along, products, vector_values
 from quiltcli.scene import Scene
 
@@ -42,7 +42,7 @@ class _Layer:
     What a material says is (n, 1), or a number where all points agree.
 
     Attributes:
-        specular0: 3 values, what it reflects at normal incidence.
+        specular0: values by colour, what it reflects at normal incidence.
         specular90: what it reflects at grazing incidence, 0 where there is none.
         coat: how much of the base it covers, 0 where there is none.
         alpha2: the square of GGX's alpha.
@@ -63,8 +63,8 @@ class _Layer:
 
 
 @dataclass(frozen=True)
-class _Points:
-    """Visible points in n groups of k, like the hits they come from.
+class _Surface:
+    """What light meets at visible points in n groups of k.
 
     What a material says is (n, 1), or a number where all points agree; vertex colours make it (n, k).
     Vectors are not of unit length: their products are divided by their lengths, which takes less time.
@@ -74,8 +74,8 @@ class _Points:
         normal_scale: (n, k), (n, 1) or (1, 1) one over their lengths.
         ray: directions from the eye.
         ray_scale: (n, k) one over their lengths, negative: towards the eye; None where nobody asks for it.
-        base: 3 values, base colour.
-        steady: 3 values, light that needs no lamp: ambient and emission, or the colour of an unlit surface.
+        base: base colour, 3 values, or 1 where all is grey.
+        steady: as many values, light that needs no lamp: ambient and emission, or an unlit surface's colour.
         diffuse: share of light for the Lambert base, over π.
         layer: what lies on the base; None where all points are matte.
     """
@@ -99,23 +99,25 @@ def shading_wants(scene: Scene) -> Wanted:
     )
 
 
-def shade(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]:
-    """Linear red, green and blue of every hit: (G, k), (G, 1) one a group, or (1, 1) one for all, float32.
+def shade(scene: Scene, eye: FloatArray, seen: Points) -> tuple[Float32Array, ...]:
+    """Linear red, green and blue of points: (n, k), (n, 1) or (1, k) where others agree, float32.
+
+    What is grey for all points has one array for the three.
 
     Args:
         scene: the scene.
         eye: (3,) world metres.
-        hits: G groups of k visible points, with what `shading_wants` asks for.
+        seen: n groups of k visible points, with what `shading_wants` asks for.
     """
-    points = _points(scene, hits)
+    points = _points(scene, seen)
     lights = scene.lights
     total: list[Values] = list(points.steady)
     for direction, color in zip(lights.directional_direction, lights.directional_color, strict=True):
         nl = along(points.normal, -direction)
         _add_light(total, points, nl, along(points.ray, -direction) if points.layer else None, color)
     for place, color in zip(lights.point_position, lights.point_color, strict=True):
-        assert hits.position is not None
-        offset = (place - eye).astype(np.float32)[:, None, None] - hits.position.astype(np.float32)
+        assert seen.position is not None
+        offset = (place - eye).astype(np.float32)[:, None, None] - seen.position.astype(np.float32)
         towards = PointVectors(offset)
         nearness = np.reciprocal(np.maximum(products(towards, towards), _LEAST_DISTANCE2))
         offset *= np.sqrt(nearness)
@@ -126,8 +128,8 @@ def shade(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]
         nl = products(points.normal, points.ray)
         nl *= points.ray_scale
         _add_light(total, points, nl, np.reciprocal(points.ray_scale), np.full(3, HEADLIGHT, np.float32))
-    groups = (hits.triangle.size, 1)
-    return tuple(np.full(groups, v) if isinstance(v, np.float32) else v for v in total)
+    colors = tuple(np.full(seen.triangle.shape, v) if isinstance(v, np.float32) else v for v in total)
+    return colors * (3 // len(colors))
 
 
 def shading_normals(hits: Hits) -> Float32Array:
@@ -136,21 +138,24 @@ def shading_normals(hits: Hits) -> Float32Array:
     return np.multiply(vector_values(hits.normal), _over_length(hits.normal))
 
 
-def _points(scene: Scene, hits: Hits) -> _Points:
-    assert hits.normal is not None
-    rows = _materials_of(scene, hits.triangle)
+def _points(scene: Scene, seen: Points) -> _Surface:
+    assert seen.normal is not None
+    rows = _materials_of(scene, seen.triangle)
     base, ambient, emission = rows[0:3], rows[3:6], rows[6:9]
     diffuse, metallic, dielectric, specular90, coat, alpha2 = rows[9:15]
     if scene.corner_colors is not None:
-        color = _colors(scene.corner_colors, hits)
+        color = _colors(scene.corner_colors, seen)
         base = tuple(v * c for v, c in zip(base, color, strict=True))
         ambient = tuple(v * c for v, c in zip(ambient, color, strict=True))
-    normal_scale = _over_length(hits.normal)
+    steady = tuple(a + e for a, e in zip(ambient, emission, strict=True))
+    if _is_grey(base) and _is_grey(steady) and scene.lights.grey:
+        base, steady = base[:1], steady[:1]
+    normal_scale = _over_length(seen.normal)
     shiny = bool(np.any(specular90))
-    ray_scale = _over_length(hits.ray, -_ONE) if shiny or scene.lights.headlight else None
+    ray_scale = _over_length(seen.ray, -_ONE) if shiny or scene.lights.headlight else None
     layer = None
     if shiny and ray_scale is not None:
-        nv = products(hits.normal, hits.ray)
+        nv = products(seen.normal, seen.ray)
         nv *= normal_scale
         nv *= ray_scale
         front = np.maximum(nv, _LEAST_COSINE)
@@ -164,22 +169,28 @@ def _points(scene: Scene, hits: Hits) -> _Points:
             root=_masking_root(front, alpha2),
             leaving=_let_through(front, coat),
         )
-    return _Points(
-        normal=hits.normal,
+    return _Surface(
+        normal=seen.normal,
         normal_scale=normal_scale,
-        ray=hits.ray,
+        ray=seen.ray,
         ray_scale=ray_scale,
         base=base,
-        steady=tuple(a + e for a, e in zip(ambient, emission, strict=True)),
+        steady=steady,
         diffuse=diffuse,
         layer=layer,
     )
 
 
+def _is_grey(color: tuple[Values, ...]) -> bool:
+    """Whether three values are one number."""
+    red = color[0]
+    return all(isinstance(value, np.float32) and value == red for value in color)
+
+
 def _reflected(dielectric: Values, metallic: Values, base: tuple[Values, ...]) -> tuple[Values, ...]:
     """What the layer reflects at normal incidence; one for all colours where nothing is metal."""
     if not np.any(metallic):
-        return (dielectric,) * 3
+        return (dielectric,) * len(base)
     return tuple(dielectric + metallic * v for v in base)
 
 
@@ -191,19 +202,19 @@ def _over_length(vectors: Vectors, sign: np.float32 = _ONE) -> Float32Array:
     return result
 
 
-def _colors(table: Float32Array, hits: Hits) -> Float32Array:
+def _colors(table: Float32Array, seen: Points) -> Float32Array:
     """Vertex colours (3, n, k) between a triangle's corners."""
-    assert hits.weights is not None
-    rows = np.ascontiguousarray(table.take(hits.triangle, axis=0).T)[:, :, None]
-    value: Float32Array = rows[3:6] * hits.weights[0]
+    assert seen.weights is not None
+    rows = _columns(table, seen.triangle)
+    value: Float32Array = rows[3:6] * seen.weights[0]
     value += rows[0:3]
-    value += rows[6:9] * hits.weights[1]
+    value += rows[6:9] * seen.weights[1]
     return value
 
 
 def _add_light(
     total: list[Values],
-    points: _Points,
+    points: _Surface,
     nl: Float32Array,
     rl: Float32Array | None,
     color: Float32Array,
@@ -215,7 +226,7 @@ def _add_light(
     receives.
 
     Args:
-        total: red, green and blue, added to.
+        total: red, green and blue, or grey, added to.
         points: the points.
         nl: (n, k) or (n, 1) products of normals and unit directions to the lamp; used up.
         rl: (n, k) products of rays and unit directions to the lamp; used up. A layer needs them.
@@ -226,7 +237,7 @@ def _add_light(
     np.maximum(nl, np.float32(0), out=nl)
     received = nl if falloff is None else nl * falloff
     layer = points.layer
-    glints: tuple[Float32Array | None, ...] = (None, None, None)
+    glints: tuple[Float32Array | None, ...] = (None,) * len(total)
     base = received
     if layer is not None:
         assert rl is not None
@@ -244,7 +255,7 @@ def _add_light(
 def _glints(
     layer: _Layer, nl: Float32Array, vl: Float32Array, received: Float32Array, color: Float32Array
 ) -> tuple[Float32Array, ...]:
-    """Red, green and blue (n, k) that a layer reflects.
+    """Red, green and blue, or grey, (n, k) that a layer reflects.
 
     GGX with Smith's height-correlated shadowing (Heitz 2014, equation 99) and Schlick's Fresnel term
     (1994); the half vector is needed only through its products with the others.
@@ -275,8 +286,9 @@ def _glints(
     strength = np.divide(received, spread, out=spread)  # but for a factor α²/2π
     rim = _fifth(np.subtract(_ROOT2, np.sqrt(half_angle, out=half_angle), out=half_angle))
     factor = a2 * np.float32(0.5 / math.pi)
-    if color[0] == color[1] == color[2] and layer.specular0[0] is layer.specular0[1]:
-        return (_fresnel(layer.specular0[0], layer, rim, factor * color[0], strength, rim),) * 3
+    first, colors = layer.specular0[0], len(layer.specular0)
+    if color[0] == color[1] == color[2] and all(value is first for value in layer.specular0):
+        return (_fresnel(first, layer, rim, factor * color[0], strength, rim),) * colors
     return tuple(_fresnel(layer.specular0[k], layer, rim, factor * color[k], strength) for k in range(3))
 
 
@@ -341,12 +353,23 @@ def _material_table(scene: Scene) -> Float32Array:
     return table
 
 
+def alpha(scene: Scene, triangle: Int32Array) -> Values:
+    """GGX's alpha of the triangles' materials, or a number where all have one."""
+    return np.sqrt(_materials_of(scene, triangle)[14])
+
+
 def _materials_of(scene: Scene, triangle: Int32Array) -> tuple[Values, ...]:
-    """The columns of the table at each group, as plain numbers where one material has all groups."""
+    """The columns of the table at triangles of any shape, as plain numbers where one material has all."""
     table = _material_table(scene)
     if len(table) == 1:
         return tuple(table[0])
     material = scene.material.take(triangle)
-    if bool((material == material[0]).all()):
-        return tuple(table[material[0]])
-    return tuple(np.ascontiguousarray(table.take(material, axis=0).T)[:, :, None])
+    first = material.flat[0]
+    if bool((material == first).all()):
+        return tuple(table[first])
+    return tuple(_columns(table, material))
+
+
+def _columns(table: Float32Array, rows: Int32Array) -> Float32Array:
+    """The table's columns (columns, …) at some of its rows (…)."""
+    return np.ascontiguousarray(table.take(rows.ravel(), axis=0).T).reshape(-1, *rows.shape)

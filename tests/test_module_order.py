@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parents[1] / "quiltcli"
 ORDER = (
     *("errors", "wholefile", "geometry", "yamlcore", "yamlfast", "yamlsyntax", "yamlfile", "frames", "job"),
     *("meshfile", "display", "layout", "packing", "viewercsv", "viewerpath", "viewer", "eyes", "scene"),
-    *("camera", "binning", "homography", "orders", "raster", "rays", "shading", "channels"),
+    *("camera", "binning", "homography", "orders", "raster", "rays", "shading", "tileshading", "channels"),
     *(
         "unmap",
         "exrcheck",

@@ -15,7 +15,7 @@ from quiltcli.scene import Materials
 
 
 def shade(scene, eye, seen):
-    return np.stack([color.ravel() for color in shading.shade(scene, eye, on(scene, seen))])
+    return np.stack([color.ravel() for color in shading.shade(scene, eye, on(scene, seen).points)])
 
 
 def shading_normals(scene, seen):

@@ -3,7 +3,7 @@
 The stages, in order: `blocks` cuts the facets' rectangles into pieces that fit the cache; `prewarp`
 gives each pair of binning to its blocks and finds its pixels there; `small` and `large` make `planes`
 of the pairs and raise the depth `keys` of a canvas; `visibility` reads from the canvas which `surfaces`
-its microtiles or single `pixels` see, and `tiles` knows where those are.
+its `whole` microtiles or single `pixels` see, and `tiles` knows where those are.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from quiltcli.raster.blocks import (
     ray_matrices,
 )
 from quiltcli.raster.depth import DepthRange, triangles_in_range
-from quiltcli.raster.hits import Hits, Places, Wanted
+from quiltcli.raster.hits import Hits, Places, Points, Wanted
 from quiltcli.raster.keys import serial_bits
 from quiltcli.raster.large import covering_keys, draw_large, large_spans
 from quiltcli.raster.order import BatchOrder
@@ -44,6 +44,7 @@ from quiltcli.raster.prewarp import (
 from quiltcli.raster.small import LIMIT, draw_small
 from quiltcli.raster.tiles import missed_pixels
 from quiltcli.raster.visibility import read_canvas
+from quiltcli.raster.whole import TileShader, WholeTiles
 from quiltcli.viewer import Viewer
 
 __all__ = [
@@ -52,8 +53,11 @@ __all__ = [
     "Drawing",
     "Frame",
     "Hits",
+    "Points",
     "Sight",
+    "TileShader",
     "Wanted",
+    "WholeTiles",
     "batches",
     "block_keys",
     "block_window",
@@ -116,9 +120,9 @@ class Drawing:
     limits: DepthRange
     bits: int
 
-    def hits(self, wanted: Wanted) -> Iterator[Hits]:
-        """What the pixels see, each of the batch at most once."""
-        return read_canvas(self.canvas, self.table, self.blocks, self.limits, self.bits, wanted)
+    def hits(self, wanted: Wanted, shader: TileShader | None = None) -> Iterator[Hits]:
+        """What the pixels see, each of the batch at most once; whole microtiles with their colours."""
+        return read_canvas(self.canvas, self.table, self.blocks, self.limits, self.bits, wanted, shader)
 
     def missed(self, block: IntArray) -> Iterator[Places]:
         """The pixels of facets that see nothing, in those of these blocks that have pairs."""
@@ -134,10 +138,11 @@ def rasterize(
     batch: tuple[int, int],
     sample: tuple[float, float] = (0.0, 0.0),
     wanted: Wanted | None = None,
+    shader: TileShader | None = None,
 ) -> Iterator[Hits]:
-    """What the pixels of one batch see; `wanted` is what the hits shall tell. See `draw`."""
+    """What the pixels of one batch see; `wanted` is what the hits shall tell. See `draw`, `Drawing.hits`."""
     drawing = draw(frame, batch, sample)
-    yield from drawing.hits(wanted or Wanted())
+    yield from drawing.hits(wanted or Wanted(), shader)
     drawing.done()
 
 

@@ -74,6 +74,25 @@ class Places:
 
 
 @dataclass(frozen=True)
+class Points:
+    """What shading has to know of n groups of k points that are seen; or of one group, where n is 1.
+
+    Attributes:
+        triangle: triangle index, (n, 1) where a group sees one, (1, k) where all groups see the same k.
+        ray: directions from the eye to the points, world axes, of any length.
+        normal: interpolated normals on the side of the eye, of any length.
+        weights: (2, n, k) barycentric weights of the triangle's second and third vertex, or None.
+        position: (3, n, k) the points minus the eye, world axes, metres, or None.
+    """
+
+    triangle: Int32Array
+    ray: Vectors
+    normal: Vectors | None
+    weights: Float32Array | None
+    position: FloatArray | None
+
+
+@dataclass(frozen=True)
 class Hits:
     """What is seen at the pixels of G groups of k; all of a group see one triangle.
 
@@ -91,6 +110,9 @@ class Hits:
         weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
         position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
         inside: how many of the drawn pixels lie in their facet's polygon, not in its bleed.
+        colors: grey, or red, green and blue, at the nodes of the microtiles, (1 or 3, 9, G), or for whole
+            microtiles (1 or 3, 1, G), as `nodes.between_nodes` takes them; None where pixels are to be
+            shaded one by one.
     """
 
     places: Places
@@ -103,6 +125,12 @@ class Hits:
     weights: Float32Array | None
     position: FloatArray | None
     inside: int
+    colors: FloatArray | None = None
+
+    @property
+    def points(self) -> Points:
+        """What shading has to know of them."""
+        return Points(self.triangle[:, None], self.ray, self.normal, self.weights, self.position)
 
     @property
     def pixel(self) -> IntArray:

@@ -49,7 +49,8 @@ def pixel_hits(
         chosen(tiles.y.astype(np.float32)[:, None] + _DY),
     )
     inverse = _inverse(planes, rows, which, x.astype(np.float64), y.astype(np.float64))[:, None]
-    ray, depth, position = rays_through(reader, tiles)
+    rays = rays_through(reader, tiles)
+    depth, position = rays.values()
     normal = weights = None
     if wanted.normals is not None:
         normal = PointVectors(_values(seen.normal, which, x, y, x0, y0))
@@ -61,7 +62,7 @@ def pixel_hits(
         chosen=None,
         facet=chosen(np.broadcast_to(tiles.facet[:, None], (tiles.facet.size, 64))),
         triangle=seen.triangle.take(which),
-        ray=PointVectors(chosen(vector_values(ray))[:, :, None]),
+        ray=PointVectors(chosen(vector_values(rays.vectors))[:, :, None]),
         depth=chosen(depth)[:, None] / inverse,
         normal=normal,
         weights=weights,

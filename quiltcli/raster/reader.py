@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.hits import Wanted
 from quiltcli.raster.planes import PlaneTable
 from quiltcli.raster.tiles import Tiles
-from quiltcli.raster.vectors import BlockVectors, exact_values
+from quiltcli.raster.vectors import BlockVectors, grid_values, on_grid
 
 
 @dataclass(frozen=True)
@@ -27,21 +27,50 @@ class Reader:
     wanted: Wanted
 
 
-def rays_through(reader: Reader, tiles: Tiles) -> tuple[BlockVectors, FloatArray, FloatArray | None]:
+@dataclass(frozen=True)
+class TileRays:
     """Rays d through the pixels of n microtiles.
 
-    Returns:
-        d, of any length; the depth (n, 64) of the points d; and these points (3, n, 64), the eye at the
-        origin, where positions are wanted.
+    Attributes:
+        vectors: d, of any length, from the eye.
+        along: (3, n) planes, on grids (`vectors.grid_values`), of the depth of d where it is planar.
+        axes: (3, 3, n) planes, on grids, of d by axis; none where neither depth nor position needs them.
+        radial: whether depth is the length of d.
+        placed: whether positions are wanted.
     """
-    limits = reader.limits
+
+    vectors: BlockVectors
+    along: FloatArray
+    axes: FloatArray
+    radial: bool
+    placed: bool
+
+    def __getitem__(self, part: slice | IntArray) -> TileRays:
+        """Those of some microtiles."""
+        along, axes = self.along[:, part], self.axes[:, :, part]
+        return TileRays(self.vectors[part], along, axes, self.radial, self.placed)
+
+    def values(self) -> tuple[FloatArray, FloatArray | None]:
+        """The depth (n, 64) of the points d, and if wanted these points (3, n, 64), the eye at the origin."""
+        points = [grid_values(plane) for plane in self.axes]
+        if self.radial:
+            x, y, z = points
+            depth = np.sqrt(x * x + y * y + z * z)
+        else:
+            depth = grid_values(self.along)
+        return depth, np.stack(points) if self.placed else None
+
+
+def rays_through(reader: Reader, tiles: Tiles) -> TileRays:
+    """Rays through the pixels of microtiles."""
+    limits, placed = reader.limits, reader.wanted.position
     matrix = np.ascontiguousarray(limits.rays.transpose(1, 2, 0))
-    ray = BlockVectors(matrix, tiles.block, tiles.x, tiles.y)
-    exact = None
-    if limits.radial or reader.wanted.position:
-        exact = np.stack([exact_values(plane) for plane in ray.planes])
-    if limits.radial and exact is not None:
-        depth = np.sqrt(exact[0] * exact[0] + exact[1] * exact[1] + exact[2] * exact[2])
-    else:
-        depth = exact_values(ray.along(limits.look))
-    return ray, depth, exact if reader.wanted.position else None
+    vectors = BlockVectors(matrix, tiles.block, tiles.x, tiles.y)
+    none = np.zeros((0, 3, tiles.x.size))
+    return TileRays(
+        vectors=vectors,
+        along=on_grid(vectors.along(limits.look)),
+        axes=on_grid(vectors.planes) if limits.radial or placed else none,
+        radial=limits.radial,
+        placed=placed,
+    )

@@ -40,9 +40,9 @@ class Tiles:
     interior: BoolArray
     number: IntArray
 
-    def take(self, rows: IntArray) -> Tiles:
-        """The microtiles with these indices."""
-        return Tiles(*(column.take(rows) for column in vars(self).values()))
+    def __getitem__(self, part: slice | IntArray) -> Tiles:
+        """Some of the microtiles."""
+        return Tiles(*(column[part] for column in vars(self).values()))
 
     def lines(self) -> IntArray:
         """Quilt addresses (n, 8) of the first pixels of their rows."""
@@ -104,9 +104,9 @@ def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: BoolArray) -> Iterator
     tiles = tiles_at(canvas, blocks, bare)
     empty = tiles.interior & ~canvas.touched[bare]
     for part in in_parts(np.flatnonzero(empty), _AT_A_TIME):
-        yield tiles.take(part).places()
+        yield tiles[part].places()
     for part in in_parts(np.flatnonzero(~empty), _AT_A_TIME):
-        some = tiles.take(part)
+        some = tiles[part]
         _, address, _ = owned_pixels(blocks, some, canvas.keys.take(some.index, axis=0) == 0)
         yield Places(address, 1)
 

@@ -32,12 +32,20 @@ class PointVectors:
 
     values: Float32Array
 
+    def __getitem__(self, part: slice | IntArray) -> PointVectors:
+        """Those of some groups."""
+        return self if self.values.shape[1] == 1 else PointVectors(self.values[:, part])
+
 
 @dataclass(frozen=True)
 class TileVectors:
     """Vectors that are linear over microtiles: planes (3, 3, G) [axis, coefficient] from the first pixel."""
 
     planes: FloatArray
+
+    def __getitem__(self, part: slice | IntArray) -> TileVectors:
+        """Those of some microtiles."""
+        return TileVectors(self.planes[:, :, part])
 
 
 @dataclass(frozen=True)
@@ -55,6 +63,10 @@ class BlockVectors:
     block: IntArray
     x: IntArray
     y: IntArray
+
+    def __getitem__(self, part: slice | IntArray) -> BlockVectors:
+        """Those of some microtiles."""
+        return BlockVectors(self.matrix, self.block[part], self.x[part], self.y[part])
 
     @cached_property
     def planes(self) -> FloatArray:
@@ -133,25 +145,26 @@ def grid_values(form: FloatArray) -> FloatArray:
 
 def exact_values(form: FloatArray) -> FloatArray:
     """As `grid_values`, of any forms: they are rounded to such grids before."""
-    scale = _scale(form)
+    return grid_values(on_grid(form))
+
+
+def on_grid(form: FloatArray) -> FloatArray:
+    """Forms (..., 3 or 6, G) rounded to grids on which every sum over a microtile is exact."""
+    terms = form.shape[-2]
+    reach = np.abs(form)
+    reach *= _WEIGHT_OF[terms][:, None]
+    greatest = reach.max(axis=-2, keepdims=True)
+    scale = power_of_two(np.maximum(greatest, 1e-300, out=greatest))  # at or below the greatest term
     grid = form / scale
-    grid += _ROUND_TO[len(form)]
-    grid -= _ROUND_TO[len(form)]
+    grid += _ROUND_TO[terms]
+    grid -= _ROUND_TO[terms]
     grid *= scale
-    return grid_values(grid)
+    return grid
 
 
 def single_values(form: FloatArray) -> Float32Array:
     """As `exact_values`, rounded once to single precision."""
     return exact_values(form).astype(np.float32)
-
-
-def _scale(form: FloatArray) -> FloatArray:
-    """The power of two (G,) at or below the greatest term of forms (3 or 6, G) in a microtile."""
-    reach = np.abs(form)
-    reach *= _WEIGHT_OF[len(form)][:, None]
-    greatest = reach.max(axis=0)
-    return power_of_two(np.maximum(greatest, 1e-300, out=greatest))
 
 
 def _sum_of_products(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:

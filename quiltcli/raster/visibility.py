@@ -1,31 +1,29 @@
 """From a drawn canvas to what each pixel sees.
 
-A microtile that one triangle fills inside a facet is read as a whole: its planes are looked up once
-and evaluated over 64 pixels. The pixels of the others are read one by one; where all 64 see
-something, they are handed on in runs of neighbours all the same, for those are stored fastest.
+Microtiles that one triangle fills are read as wholes. The pixels of the others are read one by one;
+where all 64 see something, they are handed on in runs of neighbours all the same, for those are stored
+fastest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, Int32Array, IntArray
+from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.hits import Hits, Places, Wanted
 from quiltcli.raster.keys import serial_of
 from quiltcli.raster.pixels import pixel_hits
-from quiltcli.raster.planes import PlaneTable, moved
-from quiltcli.raster.reader import Reader, rays_through
-from quiltcli.raster.surfaces import has_one_normal, one_normal, surfaces
+from quiltcli.raster.planes import PlaneTable
+from quiltcli.raster.reader import Reader
+from quiltcli.raster.surfaces import has_one_normal
 from quiltcli.raster.tiles import Tiles, in_parts, owned_pixels, tiles_at
-from quiltcli.raster.vectors import TileVectors, Vectors, exact_values, grid_values
+from quiltcli.raster.whole import TileShader, tile_hits, whole_tiles
 
-_WHOLE, _PIXELS = 2048, 512  # microtiles at a time
-_MANY = 512  # microtiles of one triangle that are worth a part of their own
+_WHOLE, _PIXELS = 4096, 512  # microtiles at a time
 
 
 def read_canvas(
@@ -35,6 +33,7 @@ def read_canvas(
     limits: DepthRange,
     bits: int,
     wanted: Wanted,
+    shader: TileShader | None = None,
 ) -> Iterator[Hits]:
     """The hits of a drawn canvas, a cache-sized number at a time.
 
@@ -45,6 +44,7 @@ def read_canvas(
         limits: how depth is measured, with the rays of the canvas's blocks.
         bits: bits of the serial in a key.
         wanted: what the hits shall tell.
+        shader: shades whole microtiles by their nodes, where it is given.
     """
     tiles = tiles_at(canvas, blocks, np.flatnonzero((canvas.touched | (canvas.filler > 0)) & canvas.used))
     if not tiles.index.size:
@@ -56,34 +56,18 @@ def read_canvas(
     is_even = np.zeros(whole.size, dtype=np.bool_)
     if wanted.normals is not None:
         is_even = has_one_normal(wanted.normals, triangle)
-    inner = tiles.interior[whole]
-    for part in _parts_by_triangle(whole[inner & is_even], triangle[inner & is_even]):
-        yield _filled_tiles(reader, tiles.take(part), serial[part], even=True)
-    for part in in_parts(whole[inner & ~is_even], _WHOLE):
-        yield _filled_tiles(reader, tiles.take(part), serial[part], even=False)
-    for even in (True, False):
-        for part in in_parts(whole[~inner & (is_even == even)], _WHOLE):
-            yield _border_tiles(reader, tiles.take(part), serial[part], even=even)
+    border = ~tiles.interior[whole]
+    for at_border, even in ((False, True), (False, False), (True, True), (True, False)):
+        chosen = whole[(border == at_border) & (is_even == even)]
+        for some in in_parts(chosen, _WHOLE):
+            found = whole_tiles(reader, tiles[some], serial[some], even=even, border=at_border)
+            yield from tile_hits(found, shader)
     for part in in_parts(np.flatnonzero(complete), _PIXELS):
-        yield _complete_tiles(reader, tiles.take(part))
+        yield _complete_tiles(reader, tiles[part])
     for part in in_parts(np.flatnonzero(~complete & (serial < 0)), _PIXELS):
-        hits = _scattered_pixels(reader, tiles.take(part))
+        hits = _scattered_pixels(reader, tiles[part])
         if hits.triangle.size:
             yield hits
-
-
-def _parts_by_triangle(rows: IntArray, triangle: Int32Array) -> Iterator[IntArray]:
-    """Microtiles (n,) in parts; those of a triangle that fills many are by themselves.
-
-    What a triangle has one of is one number for all pixels of such a part, and numbers are faster.
-    """
-    order = np.argsort(triangle, kind="stable")
-    start = np.flatnonzero(np.diff(triangle[order], prepend=-1))
-    count = np.diff(start, append=order.size)
-    many = count >= _MANY
-    for first, size in zip(start[many].tolist(), count[many].tolist(), strict=True):
-        yield from in_parts(rows[order[first : first + size]], _WHOLE)
-    yield from in_parts(rows[np.sort(order[np.repeat(~many, count)])], _WHOLE)
 
 
 def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
@@ -104,48 +88,6 @@ def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
     complete = np.zeros(serial.size, dtype=np.bool_)
     complete[keyed[~one]] = True
     return serial, complete & tiles.interior
-
-
-def _border_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
-    """As `_filled_tiles`, of microtiles at the border of a facet: only the pixels that the facet owns."""
-    hits = _filled_tiles(reader, tiles, serial, even=even)
-    pixel, address, inside = owned_pixels(reader.blocks, tiles, np.ones(hits.depth.shape, dtype=np.bool_))
-    return replace(hits, places=Places(address, 1), chosen=pixel, inside=inside)
-
-
-def _filled_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool) -> Hits:
-    """Hits of all pixels of microtiles (G,) that are filled by one pair each.
-
-    With `even`, each of their triangles has one normal.
-    """
-    planes, wanted, handed = reader.table.planes, reader.wanted, reader.limits.handed
-    rows = reader.table.row_of_serial.take(serial)
-    normal: Vectors | None = None
-    if even and wanted.normals is not None:
-        normal = one_normal(wanted.normals, planes, rows, handed)
-        wanted = replace(wanted, normals=None)
-    seen = surfaces(planes, rows, wanted, handed, tiles.x, tiles.y)
-    if wanted.normals is not None:
-        normal = TileVectors(seen.normal.astype(np.float64))
-    inverse = grid_values(moved(np.take(planes.inverse, rows, axis=1), tiles.x, tiles.y))
-    ray, depth, position = rays_through(reader, tiles)
-    depth /= inverse
-    weights = None
-    if wanted.weights:
-        second, third, total = (exact_values(plane) for plane in seen.weights)
-        weights = np.stack((second / total, third / total)).astype(np.float32)
-    return Hits(
-        places=tiles.places(),
-        chosen=None,
-        facet=tiles.facet,
-        triangle=seen.triangle,
-        ray=ray,
-        depth=depth,
-        normal=normal,
-        weights=weights,
-        position=None if position is None else position / inverse,
-        inside=depth.size,
-    )
 
 
 def _complete_tiles(reader: Reader, tiles: Tiles) -> Hits:

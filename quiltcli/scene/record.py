@@ -51,6 +51,12 @@ class Lights:
     ambient: Float32Array
     headlight: bool
 
+    @cached_property
+    def grey(self) -> bool:
+        """Whether no lamp has a hue."""
+        lamps = np.concatenate((self.directional_color, self.point_color))
+        return bool((lamps == lamps[:, :1]).all())
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:

@@ -14,6 +14,7 @@ from types import GeneratorType
 from typing import Any
 
 from quiltcli import binframe, binning, channels, draw, raster
+from quiltcli.tileshading import NodeShader
 
 STAGES: tuple[tuple[object, str, str], ...] = (
     (draw, "bin_frame", "bin"),
@@ -25,12 +26,14 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (raster, "large_spans", "large triangles"),
     (raster, "draw_large", "large triangles"),
     (raster, "read_canvas", "visibility"),
-    (channels, "shade", "shade"),
+    (NodeShader, "calm", "shade"),
+    (NodeShader, "colors", "shade"),
+    (channels, "pixel_colors", "shade"),
     (draw, "fill", "store"),
     (draw, "clear", "clear"),
     (draw, "clear_blocks", "clear"),
 )
-"""Module, function, and the stage whose time it is."""
+"""Module or class, function, and the stage whose time it is."""
 
 
 @contextmanager

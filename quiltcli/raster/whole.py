@@ -1,0 +1,156 @@
+"""Microtiles that one triangle fills each: their planes are looked up once and evaluated over 64 pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
+from quiltcli.raster.blocks import Blocks
+from quiltcli.raster.hits import Hits, Places, Points
+from quiltcli.raster.nodes import at_nodes, vectors_at_nodes
+from quiltcli.raster.planes import moved
+from quiltcli.raster.reader import Reader, TileRays, rays_through
+from quiltcli.raster.surfaces import one_normal, surfaces
+from quiltcli.raster.tiles import Tiles, owned_pixels
+from quiltcli.raster.vectors import TileVectors, Vectors, grid_values, on_grid
+
+_AT_A_TIME = 2048
+
+
+@dataclass(frozen=True)
+class WholeTiles:
+    """G microtiles, each filled by one triangle.
+
+    Attributes:
+        tiles: where they lie.
+        triangle: (G,) triangle index.
+        rays: rays through their pixels.
+        inverse: (3, G) planes of 1/t on grids (`vectors.grid_values`), from their first pixels.
+        normal: normals on the side of the eye, of any length; None unless wanted.
+        weights: (3, 3, G) planes, on grids, of the second and third edge function and of the sum of all;
+            none unless wanted, (0, 3, G).
+        border: the blocks, where some pixels are not the facet's; None where all are.
+    """
+
+    tiles: Tiles
+    triangle: Int32Array
+    rays: TileRays
+    inverse: FloatArray
+    normal: Vectors | None
+    weights: FloatArray
+    border: Blocks | None
+
+    def __getitem__(self, part: slice | IntArray) -> WholeTiles:
+        """Some of the microtiles."""
+        return WholeTiles(
+            tiles=self.tiles[part],
+            triangle=self.triangle[part],
+            rays=self.rays[part],
+            inverse=self.inverse[:, part],
+            normal=None if self.normal is None else self.normal[part],
+            weights=self.weights[:, :, part],
+            border=self.border,
+        )
+
+    def at_nodes(self) -> Points:
+        """What is seen at the nodes of the microtiles."""
+        weights = position = None
+        if len(self.weights):
+            second, third, total = at_nodes(self.weights)
+            weights = np.stack((second / total, third / total)).astype(np.float32)
+        if self.rays.placed:
+            position = at_nodes(self.rays.axes) / at_nodes(self.inverse)
+        return Points(
+            triangle=self.triangle[None],
+            ray=vectors_at_nodes(self.rays.vectors),
+            normal=None if self.normal is None else vectors_at_nodes(self.normal),
+            weights=weights,
+            position=position,
+        )
+
+    def hits(self, colors: FloatArray | None) -> Hits:
+        """What their pixels see; `colors` are those at the nodes, as for `Hits`."""
+        inverse = grid_values(self.inverse)
+        depth, position = self.rays.values()
+        depth /= inverse
+        weights = None
+        if len(self.weights):
+            second, third, total = (grid_values(plane) for plane in self.weights)
+            weights = np.stack((second / total, third / total)).astype(np.float32)
+        places, chosen, inside = self._places(depth.shape)
+        return Hits(
+            places=places,
+            chosen=chosen,
+            facet=self.tiles.facet,
+            triangle=self.triangle,
+            ray=self.rays.vectors,
+            depth=depth,
+            normal=self.normal,
+            weights=weights,
+            position=None if position is None else position / inverse,
+            inside=inside,
+            colors=colors,
+        )
+
+    def _places(self, shape: tuple[int, ...]) -> tuple[Places, IntArray | None, int]:
+        """Where the pixels lie that are drawn; which these are; how many are no bleed."""
+        if self.border is None:
+            return self.tiles.places(), None, shape[0] * shape[1]
+        pixel, address, inside = owned_pixels(self.border, self.tiles, np.ones(shape, dtype=np.bool_))
+        return Places(address, 1), pixel, inside
+
+
+class TileShader(Protocol):
+    """Whoever can shade microtiles by their nodes."""
+
+    def calm(self, tiles: WholeTiles) -> BoolArray:
+        """Which microtiles (G,) nodes tell enough of."""
+
+    def colors(self, tiles: WholeTiles) -> FloatArray:
+        """Colours at the nodes of microtiles, as for `Hits`."""
+
+
+def whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool, border: bool) -> WholeTiles:
+    """Microtiles (G,) that one pair each fills.
+
+    Args:
+        reader: the canvas.
+        tiles: where they lie.
+        serial: (G,) the pairs.
+        even: whether each of their triangles has one normal.
+        border: whether some of their pixels are not the facet's.
+    """
+    planes, wanted, handed = reader.table.planes, reader.wanted, reader.limits.handed
+    rows = reader.table.row_of_serial.take(serial)
+    normal: Vectors | None = None
+    if even and wanted.normals is not None:
+        normal = one_normal(wanted.normals, planes, rows, handed)
+        wanted = replace(wanted, normals=None)
+    seen = surfaces(planes, rows, wanted, handed, tiles.x, tiles.y)
+    if wanted.normals is not None:
+        normal = TileVectors(seen.normal.astype(np.float64))
+    return WholeTiles(
+        tiles=tiles,
+        triangle=seen.triangle,
+        rays=rays_through(reader, tiles),
+        inverse=moved(np.take(planes.inverse, rows, axis=1), tiles.x, tiles.y),
+        normal=normal,
+        weights=on_grid(seen.weights),
+        border=reader.blocks if border else None,
+    )
+
+
+def tile_hits(tiles: WholeTiles, shader: TileShader | None) -> Iterator[Hits]:
+    """Hits of microtiles, a cache-sized number at a time; shaded at their nodes where that is enough."""
+    calm = np.zeros(tiles.triangle.size, dtype=np.bool_) if shader is None else shader.calm(tiles)
+    for some, by_nodes in ((calm, True), (~calm, False)):
+        if some.any():
+            chosen = tiles if some.all() else tiles[np.flatnonzero(some)]
+            colors = shader.colors(chosen) if shader is not None and by_nodes else None
+            for at in range(0, chosen.triangle.size, _AT_A_TIME):
+                part = slice(at, at + _AT_A_TIME)
+                yield chosen[part].hits(None if colors is None else colors[:, :, part])

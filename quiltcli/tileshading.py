@@ -1,0 +1,117 @@
+"""Shading whole microtiles by nine points each.
+
+Across the 8 × 8 pixels of a microtile that one triangle fills, light hardly ever changes in a way that a
+polynomial of second degree cannot follow. Where that is sure, colours are worked out at the nine nodes
+alone, and the polynomial between them is closer to the others than half floats can tell. Everything
+else is shaded pixel by pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray
+from quiltcli.raster import Hits, WholeTiles
+from quiltcli.raster.nodes import between_nodes, centre, centre_of, on_grids, reach, reach_of
+from quiltcli.scene import Scene
+from quiltcli.shading import alpha, shade
+
+_CALM = 24.0
+"""A function is calm in a microtile that reaches a 24th of the way to the function's nearest pole."""
+
+_FLOOR = 1 / 64
+"""Where cosines are smaller, single precision is too coarse for a polynomial."""
+
+
+def pixel_colors(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]:
+    """As `shading.shade`, of hits whose colours may be known at nodes; one array where all is grey."""
+    if hits.colors is not None:
+        return tuple(map(between_nodes, hits.colors))
+    colors = shade(scene, eye, hits.points)
+    return colors[:1] if _is_grey(colors) else colors
+
+
+def _is_grey(colors: tuple[Float32Array, ...]) -> bool:
+    return all(color is colors[0] for color in colors)
+
+
+@dataclass(frozen=True)
+class NodeShader:
+    """A `raster.TileShader` of a scene and an eye (3,)."""
+
+    scene: Scene
+    eye: FloatArray
+
+    def colors(self, tiles: WholeTiles) -> FloatArray:
+        """Colours (1 or 3, 9, G) at the nodes, or (1 or 3, 1, G) where no pixel differs from another."""
+        colors = shade(self.scene, self.eye, tiles.at_nodes())
+        known = colors[:1] if _is_grey(colors) else colors
+        shape = max(map(len, known)), tiles.triangle.size
+        return on_grids(np.stack([np.broadcast_to(color, shape) for color in known]))
+
+    def calm(self, tiles: WholeTiles) -> BoolArray:
+        """Which microtiles (G,) have no glint, no shadow's edge and no grazing view in or near them.
+
+        Light is made of few functions: the lengths of vectors, Schlick's and Smith's of the angle between
+        normal and eye or lamp, and GGX's of the angle between normal and half vector, all with poles or
+        kinks that are known. What a polynomial misses falls with the third power of the distance to them.
+        """
+        assert tiles.normal is not None
+        ray, normal = centre(tiles.rays.vectors), centre(tiles.normal)
+        ray_over, normal_over = _over_length(ray), _over_length(normal)
+        eye, normal = -ray * ray_over, normal * normal_over
+        eye_turn, normal_turn = reach(tiles.rays.vectors) * ray_over, reach(tiles.normal) * normal_over
+        depth_turn = reach_of(tiles.inverse) / centre_of(tiles.inverse)
+        nv = _dot(normal, eye)
+        result: BoolArray = nv > np.maximum(_CALM * (eye_turn + normal_turn), _FLOOR)
+        if tiles.rays.placed or len(tiles.weights):
+            result &= _CALM * depth_turn < 1
+        rough = alpha(self.scene, tiles.triangle)
+        for lamp, lamp_turn in self._lamps(tiles, eye, eye_turn, eye_turn + depth_turn):
+            nl = _dot(normal, lamp)
+            half2 = np.maximum(1 + _dot(eye, lamp), 1e-12)  # 2 (v·h)²
+            sine2 = np.maximum(1 - np.maximum(nv + nl, 0) ** 2 / (2 * half2), 0)  # of the angle n, h
+            lamp_reach = _CALM * (normal_turn + lamp_turn)
+            half_reach = _CALM * (normal_turn + (eye_turn + lamp_turn) / np.sqrt(2 * half2))
+            pole2 = sine2 + rough * rough
+            result &= np.abs(nl) > np.maximum(lamp_reach, _FLOOR)
+            result &= half2 > 2 * (_CALM * (eye_turn + lamp_turn)) ** 2
+            result &= (pole2 > half_reach**2) & (pole2 * half2 > 2 * _FLOOR)
+        return np.broadcast_to(result, tiles.triangle.shape)
+
+    def _lamps(
+        self, tiles: WholeTiles, eye: FloatArray, eye_turn: FloatArray, move: FloatArray
+    ) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Unit directions (3, G) or (3, 1) to the lamps, and the angle (G,) or (1,) they turn by.
+
+        Args:
+            tiles: G microtiles.
+            eye: (3, G) unit directions to the eye.
+            eye_turn: (G,) the angle they turn by.
+            move: (G,) how far points of the microtiles are from their middle, over their distance.
+        """
+        lights = self.scene.lights
+        for direction in lights.directional_direction:
+            yield -direction.astype(np.float64)[:, None], np.zeros(1)
+        if lights.headlight:
+            yield eye, eye_turn
+        if len(lights.point_position):
+            point = centre_of(tiles.rays.axes) / centre_of(tiles.inverse)
+            distance = np.sqrt(_dot(point, point))
+            for place in lights.point_position:
+                offset = (place - self.eye)[:, None] - point
+                over = _over_length(offset)
+                yield offset * over, move * distance * over
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Products (G,) of vectors (3, G), summed in the order x, y, z."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def _over_length(vectors: FloatArray) -> FloatArray:
+    """One over the lengths (G,) of vectors (3, G)."""
+    return np.asarray(1 / np.sqrt(_dot(vectors, vectors) + 1e-300))

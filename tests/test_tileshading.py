@@ -1,0 +1,165 @@
+"""Microtiles shaded at nine nodes against the same shaded pixel by pixel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rig import CUBE, CUBE_FACES, display
+from wallscene import lights, wall
+
+from quiltcli.draw import draw_frame, new_buffers
+from quiltcli.geometry import normalized
+from quiltcli.raster.nodes import at_nodes, between_nodes, on_grids
+from quiltcli.raster.reader import TileRays
+from quiltcli.raster.tiles import Tiles
+from quiltcli.raster.vectors import BASIS, BlockVectors, TileVectors, on_grid
+from quiltcli.raster.whole import WholeTiles
+from quiltcli.shading import shade
+from quiltcli.tileshading import NodeShader, pixel_colors
+from tests.benchmarks.meshes import room
+from tests.benchmarks.stages import cube, stage_for, viewer_of
+
+COUNT = 500
+EYE = np.array([0.1, -0.2, 0.3])
+STEP = 2.0**-11
+"""From one half float to the next, over their size, at most; at least it is half of that."""
+
+
+def planes(centre, reach, rng):
+    """Planes (3, 3, n) of vectors that differ by up to `reach` (n, 1) from those (n, 3) in the middle."""
+    a, b = (normalized(rng.normal(size=centre.shape)) * reach / 7 for _ in range(2))
+    return np.stack((a.T, b.T, (centre - 3.5 * (a + b)).T), axis=1)
+
+
+def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False):
+    """Microtiles that see anything from anywhere, every other one a surface near the lamp's image."""
+    rays = planes(normalized(rng.normal(size=(COUNT, 3))), 10 ** rng.uniform(-4, -0.5, (COUNT, 1)), rng)
+    towards = -(rays[:, 2] + 3.5 * (rays[:, 0] + rays[:, 1])).T
+    spread = 10 ** rng.uniform(-4, 0, (COUNT, 1))
+    middle = normalized(towards + lamp) if near_glint else towards
+    normal = normalized(middle + rng.normal(size=(COUNT, 3)) * spread)
+    normal *= np.sign((normal * towards).sum(axis=1))[:, None]
+    turn = 10 ** rng.uniform(-4, -0.5, (COUNT, 1)) * bent
+    none = np.zeros(COUNT, np.int64)
+    vectors = BlockVectors(rays, np.arange(COUNT), none, none)
+    inverse = np.stack([rng.normal(size=COUNT) * 10 ** rng.uniform(-5, -2, COUNT) for _ in range(3)])
+    inverse[2] += 1
+    weights = np.stack((inverse * 0.2, inverse * 0.3, inverse)) if colored else np.zeros((0, 3, COUNT))
+    if colored:
+        weights[:2, :2] += rng.normal(size=(2, 2, COUNT)) * 0.01
+    rayed = on_grid(vectors.planes) if placed else np.zeros((0, 3, COUNT))
+    return WholeTiles(
+        tiles=Tiles(*[none] * 9),
+        triangle=np.zeros(COUNT, np.int32),
+        rays=TileRays(vectors, on_grid(vectors.along([0, 0, 1.0])), rayed, radial=False, placed=placed),
+        inverse=on_grid(inverse),
+        normal=TileVectors(planes(normal, turn, rng)),
+        weights=on_grid(weights),
+        border=None,
+    )
+
+
+def relative_errors(scene, some):
+    """How far microtiles (n, 64) shaded at nodes are from pixel by pixel, over the value, of all colours."""
+    exact = shade(scene, EYE, some.hits(None).points)
+    found = pixel_colors(scene, EYE, some.hits(NodeShader(scene, EYE).colors(some)))
+    found *= 3 // len(found)
+    return np.stack(
+        [np.abs(f.astype(float) - e) / np.maximum(e, 1e-4) for f, e in zip(found, exact, strict=True)]
+    )
+
+
+@pytest.mark.parametrize("lamp_is", ["sun", "eye", "point"])
+@pytest.mark.parametrize("roughness", [0.0, 0.3, 0.5, 1.0])
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+def test_calm_microtiles_are_nearer_than_half_floats_tell(lamp_is, roughness, metallic):
+    rng = np.random.default_rng(5)
+    checked = 0
+    for bent in (False, True):
+        for near_glint in (False, True):
+            lamp = normalized(rng.normal(size=3))
+            lamps = {
+                "sun": lights([-lamp], [[3, 2, 1]], ambient=(0.1, 0.1, 0.1)),
+                "eye": lights(headlight=True),
+                "point": lights(point=rng.normal(size=(2, 3)), power=[[3, 2, 1], [1, 1, 1]]),
+            }
+            scene = wall(lamps[lamp_is], color=(0.9, 0.5, 0.2), metallic=metallic, roughness=roughness)
+            some = tiles(rng, lamp, bent=bent, near_glint=near_glint, placed=lamp_is == "point")
+            calm = np.flatnonzero(NodeShader(scene, EYE).calm(some))
+            checked += calm.size
+            assert relative_errors(scene, some[calm]).max(initial=0) < STEP / 4
+    assert checked > COUNT / 5
+
+
+def test_vertex_colours_are_calm_too():
+    rng = np.random.default_rng(6)
+    lamp = np.array([0.0, 0.6, 0.8])
+    scene = wall(lights([-lamp], [[1, 1, 1]]))
+    scene = replace(scene, colors=np.float32([[1, 0.2, 0.1], [0.1, 1, 0.4], [0.3, 0.3, 1]]))
+    some = tiles(rng, lamp, bent=False, near_glint=False, colored=True)
+    calm = np.flatnonzero(NodeShader(scene, EYE).calm(some))
+    assert calm.size > COUNT / 5
+    assert relative_errors(scene, some[calm]).max() < STEP / 4
+
+
+def test_a_glint_between_the_nodes_is_not_calm():
+    # Mirrors whose normals turn by 0.3 across the microtile: the lamp's image is smaller than a pixel.
+    rng = np.random.default_rng(7)
+    lamp = np.array([0.0, 0.0, 1.0])
+    scene = wall(lights([-lamp], [[1, 1, 1]]), metallic=1.0, roughness=0.0)
+    some = tiles(rng, lamp, bent=True, near_glint=True)
+    wide = np.sqrt((some.normal.planes[:, :2] ** 2).sum(axis=(0, 1))) > 0.02
+    assert wide.sum() > 10
+    assert not NodeShader(scene, EYE).calm(some)[wide].any()
+
+
+def test_a_polynomial_of_second_degree_is_its_own():
+    x, y, _ = BASIS
+    rng = np.random.default_rng(8)
+    c = rng.normal(size=(COUNT, 3, 3))
+    powers = np.stack((np.ones(64), x, x * x)), np.stack((np.ones(64), y, y * y))
+    expected = np.einsum("gij,ip,jp->gp", c, *powers)
+    places = [at_nodes(np.array(plane)[:, None])[:, 0] for plane in ([1.0, 0, 0], [0.0, 1, 0])]
+    at = np.stack((np.ones(9), places[0], places[0] ** 2)), np.stack((np.ones(9), places[1], places[1] ** 2))
+    nodes = np.einsum("gij,ip,jp->pg", c, *at).astype(np.float32)
+    largest = np.abs(nodes).max(axis=0)[:, None]
+    assert (np.abs(between_nodes(on_grids(nodes)) - expected) <= 4 * 2.0**-23 * largest).all()
+
+
+def test_no_microtile_depends_on_its_company():
+    rng = np.random.default_rng(9)
+    lamp = np.array([0.0, 0.6, 0.8])
+    scene = wall(lights([-lamp], [[3, 2, 1]]), color=(0.9, 0.5, 0.2))
+    some = tiles(rng, lamp, bent=True, near_glint=False)
+    shader = NodeShader(scene, EYE)
+    calm, colors = shader.calm(some), shader.colors(some)
+    pixels = [between_nodes(color) for color in colors]
+    for part in (slice(3, 4), slice(17, 60), np.array([5, 400, 7])):
+        np.testing.assert_array_equal(shader.calm(some[part]), calm[part])
+        alone = shader.colors(some[part])
+        np.testing.assert_array_equal(alone, colors[:, :, part])
+        for mine, all_of_them in zip(alone, pixels, strict=True):
+            np.testing.assert_array_equal(between_nodes(mine), all_of_them[part])
+
+
+def test_a_frame_is_the_same_to_within_one_step_of_its_half_floats(monkeypatch):
+    place = cube()
+    stage = stage_for(replace(place, facets=display(CUBE, CUBE_FACES[:5], 300)), room(2))
+    viewer = viewer_of(place)
+    by_nodes, by_pixels = new_buffers(stage), new_buffers(stage)
+    calm = []
+    asked = NodeShader.calm
+    monkeypatch.setattr(NodeShader, "calm", lambda *given: calm.append(asked(*given)) or calm[-1])
+    draw_frame(stage, viewer, by_nodes)
+    monkeypatch.setattr(NodeShader, "calm", lambda _, some: np.zeros(some.triangle.size, bool))
+    draw_frame(stage, viewer, by_pixels)
+    assert np.concatenate(calm).sum() > 1000
+    for name, pixels in by_pixels.items():
+        if name in "RGB":
+            steps = by_nodes[name].view(np.int16).astype(int) - pixels.view(np.int16)
+            assert np.abs(steps).max() <= 1
+            assert np.count_nonzero(steps) < 0.01 * np.count_nonzero(pixels)
+        else:
+            np.testing.assert_array_equal(by_nodes[name], pixels)
