@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from quiltcli.geometry import FloatArray
 from quiltcli.raster.hits import Hits, Wanted
+from quiltcli.raster.nodes import MOST_BETWEEN, between_nodes
 from quiltcli.scene import Scene
 from quiltcli.shading import MOST_HALF, shading_normals, shading_wants
 from quiltcli.tileshading import pixel_colors
@@ -49,7 +50,10 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
 
 
 def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Sequence[Values]:
-    colors = [half_floats(color) for color in pixel_colors(scene, viewer.eye, hits)]
+    if hits.colors is None:
+        colors = list(map(half_floats, pixel_colors(scene, viewer.eye, hits)))
+    else:
+        colors = list(map(_halves_between, hits.colors))
     return *colors * (3 // len(colors)), np.ones((1, 1), dtype=np.float16)
 
 
@@ -82,7 +86,8 @@ def _point(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
     return hits.position + viewer.eye[:, None, None]
 
 
-_MOST_SCALED = MOST_HALF * np.float32(2.0**-112)
+_SCALE = 2.0**-112
+_MOST_SCALED = MOST_HALF * np.float32(_SCALE)
 _HALF, _FLOAT, _UINT = np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.uint32)
 
 # Depths are measured in double precision and rounded once. A pixel that sees nothing is infinitely
@@ -138,8 +143,20 @@ def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
     A product with 2⁻¹¹² has the exponent of a half float, small ones denormal as theirs are; then the
     bits that a half float lacks are rounded away. `astype` would take five times as long.
     """
-    scaled = values * np.float32(2.0**-112)
-    np.minimum(scaled, _MOST_SCALED, out=scaled)
+    scaled = values * np.float32(_SCALE)
+    return _rounded(np.minimum(scaled, _MOST_SCALED, out=scaled))
+
+
+def _halves_between(nodes: FloatArray) -> NDArray[np.float16]:
+    """As `half_floats` of `between_nodes`: there are fewer nodes than pixels to scale and to look for much."""
+    scaled = between_nodes(nodes * _SCALE)
+    if nodes.max(initial=0.0) * MOST_BETWEEN > MOST_HALF:
+        np.minimum(scaled, _MOST_SCALED, out=scaled)
+    return _rounded(scaled)
+
+
+def _rounded(scaled: NDArray[np.float32]) -> NDArray[np.float16]:
+    """Half floats of numbers that have their exponents; `scaled` is used up."""
     bits = scaled.view(np.uint32)
     bits += np.uint32(0x1000)
     bits >>= np.uint32(13)

@@ -49,8 +49,10 @@ class NodeShader:
         """Colours (1 or 3, 9, G) at the nodes, or (1 or 3, 1, G) where no pixel differs from another."""
         colors = shade(self.scene, self.eye, tiles.at_nodes())
         known = colors[:1] if _is_grey(colors) else colors
-        shape = max(map(len, known)), tiles.triangle.size
-        return on_grids(np.stack([np.broadcast_to(color, shape) for color in known]))
+        nodes = np.empty((len(known), max(map(len, known)), tiles.triangle.size))
+        for values, color in zip(nodes, known, strict=True):
+            values[:] = color
+        return on_grids(nodes)
 
     def calm(self, tiles: WholeTiles) -> BoolArray:
         """Which microtiles (G,) have no glint, no shadow's edge and no grazing view in or near them.

@@ -9,6 +9,7 @@ import pytest
 from rig import CUBE, CUBE_FACES, display
 from wallscene import lights, wall
 
+from quiltcli.channels import CHANNELS, half_floats
 from quiltcli.draw import draw_frame, new_buffers
 from quiltcli.geometry import normalized
 from quiltcli.raster.nodes import at_nodes, between_nodes, on_grids
@@ -125,7 +126,20 @@ def test_a_polynomial_of_second_degree_is_its_own():
     at = np.stack((np.ones(9), places[0], places[0] ** 2)), np.stack((np.ones(9), places[1], places[1] ** 2))
     nodes = np.einsum("gij,ip,jp->pg", c, *at).astype(np.float32)
     largest = np.abs(nodes).max(axis=0)[:, None]
-    assert (np.abs(between_nodes(on_grids(nodes)) - expected) <= 4 * 2.0**-23 * largest).all()
+    assert (np.abs(between_nodes(on_grids(nodes.astype(float))) - expected) <= 4 * 2.0**-23 * largest).all()
+
+
+@pytest.mark.parametrize("color", [(1e-6, 0.3, 7.0), (60000.0, 65504.0, 1e6)])
+def test_colours_between_nodes_are_rounded_like_others(color):
+    lamp = np.array([0.0, 0.6, 0.8])
+    scene = wall(lights([-lamp], [[1, 1, 1]], ambient=color), color=(1, 1, 1))
+    some = tiles(np.random.default_rng(10), lamp, bent=True, near_glint=False)
+    some = some[NodeShader(scene, EYE).calm(some)]
+    seen = some.hits(NodeShader(scene, EYE).colors(some))
+    red, green, blue, _ = CHANNELS["rgba"].values(scene, None, seen)
+    for found, values in zip((red, green, blue), pixel_colors(scene, EYE, seen), strict=True):
+        np.testing.assert_array_equal(found, half_floats(values))
+        assert np.isfinite(found).all()
 
 
 def test_no_microtile_depends_on_its_company():

@@ -74,19 +74,21 @@ def _weights() -> FloatArray:
 
 
 _WEIGHTS, _WHOLE = _weights(), 72.0**2
+MOST_BETWEEN = float(np.abs(_WEIGHTS).sum(axis=0).max())
+"""How many times as great as the greatest of `on_grids` a pixel may be."""
 
 
-def on_grids(values: Float32Array) -> FloatArray:
-    """Values (..., 9, G) at the nodes, made ready for `between_nodes`: every sum there is exact then.
+def on_grids(nodes: FloatArray) -> FloatArray:
+    """Values (..., 9, G) at the nodes made ready for `between_nodes`, in place: every sum there is exact then.
 
     The grid's step is 2⁻³⁸ of the greatest value of a microtile; weights and sums have less than 15 bits.
     Values (..., 1, G) that all nodes share stay as they are.
     """
-    nodes = values.astype(np.float64)
     if nodes.shape[-2] == 1:
         return nodes
-    nodes /= _WHOLE
-    greatest = np.abs(nodes).max(axis=-2, keepdims=True)
+    nodes *= 1 / _WHOLE
+    greatest = nodes.max(axis=-2, keepdims=True)
+    np.maximum(greatest, -nodes.min(axis=-2, keepdims=True), out=greatest)
     rounding = power_of_two(np.maximum(greatest, 1e-300, out=greatest))
     rounding *= 1.5 * 2.0**14
     nodes += rounding
