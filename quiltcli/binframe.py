@@ -35,7 +35,8 @@ class Seen:
     Attributes:
         vertices: (V, 3) world minus eye, metres.
         depth: (V,) as the viewer measures it, metres.
-        core: (V,) part of the display whose core the ray through the vertex meets, −1 for none.
+        core: (V,) part of the display whose core the ray through the vertex meets; −1 for none, and where
+            all triangles at the vertex are left out because they face away.
         block: (V,) the block that it lies well inside of, −1 for none.
         cut: (T,) triangles that reach beyond the near or far depth.
     """
@@ -125,7 +126,13 @@ def see_vertices(plan: BinPlan, part: slice, seen: Seen) -> None:
     """Find out about some of the vertices and write it down."""
     vertices = np.subtract(plan.scene.vertices[part], plan.viewer.eye, out=seen.vertices[part])
     seen.depth[part] = plan.viewer.depth_of(vertices.T)
-    core = seen.core[part] = plan.cores.met_by(vertices)
+    if plan.culling:
+        asked = np.flatnonzero(may_face(plan.scene.facing[:, part], vertices))
+        core = np.full(len(vertices), -1, dtype=np.int32)
+        core[asked] = plan.cores.met_by(vertices.take(asked, axis=0))
+    else:
+        core = plan.cores.met_by(vertices)
+    seen.core[part] = core
     facet = np.append(plan.cones.whole_facet, np.int32(-1)).take(core)
     seen.block[part] = vertex_blocks(vertices, facet, plan.rays, plan.blocks)
 
@@ -187,4 +194,15 @@ def faces_eye(planes: FloatArray, eye: FloatArray) -> BoolArray:
     """Which triangles with these `planes` (4, T) are wound counter-clockwise as seen from `eye` (3,)."""
     x, y, z, offset = planes
     result: BoolArray = x * eye[0] + y * eye[1] + z * eye[2] > offset
+    return result
+
+
+def may_face(facing: FloatArray, vertices: FloatArray) -> BoolArray:
+    """Which vertices (n, 3), minus the eye, have triangles that may face the eye, by `Scene.facing` (4, n).
+
+    A wrong answer costs time, nothing else: without a core its triangles are settled by the second pass.
+    """
+    x, y, z = vertices.T
+    towards = facing[0] * x + facing[1] * y + facing[2] * z
+    result: BoolArray = towards < facing[3] * np.sqrt(x * x + y * y + z * z)
     return result

@@ -177,6 +177,8 @@ class Pool:
         self._frame = 0
         # Made once, before there are copies of the process.
         _ = stage.scene.planes, stage.scene.corner_normals, stage.scene.corner_colors
+        if stage.job.render.backface_culling:
+            _ = stage.scene.facing
         context = multiprocessing.get_context("fork")
         self._workers: list[_Worker] = []
         for _number in range(workers):

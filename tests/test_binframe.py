@@ -11,7 +11,7 @@ from ballstage import ball_scene, stage_of_facets
 from rig import cube, display, viewer
 from wallscene import lights, wall
 
-from quiltcli.binframe import bin_frame, bin_share, join, see_vertices, sight_of, unseen
+from quiltcli.binframe import bin_frame, bin_share, faces_eye, join, may_face, see_vertices, sight_of, unseen
 from quiltcli.display import lit_facets
 from quiltcli.draw import draw_frame, new_buffers, plan_of
 from quiltcli.homography import quilt_rays
@@ -88,3 +88,20 @@ def test_a_triangle_across_a_notch_is_seen_in_the_notch(density):
     seen = np.isfinite(buffers["Z"])
     for facet in (1, 2):
         assert np.count_nonzero(seen & (stage.owners == facet)) > 20
+
+
+def test_vertices_seen_from_in_front_are_those_of_triangles_that_face_the_eye():
+    ball = ball_scene(4)
+    rng = np.random.default_rng(3)
+    for eye in rng.normal(size=(20, 3)) * 2:
+        towards = may_face(ball.facing, ball.vertices - eye)
+        facing = np.zeros(len(ball.vertices), bool)
+        facing[ball.triangles[faces_eye(ball.planes, eye)]] = True
+        assert towards[facing].all()
+        assert np.count_nonzero(towards & ~facing) < 0.1 * len(ball.vertices)
+
+
+def test_vertices_of_triangles_that_face_every_way_are_seen_from_everywhere():
+    back = replace(wall(lights()), triangles=np.array([[0, 1, 2], [0, 2, 1]], np.int32))
+    for eye in ([0.0, 0, 2], [0.0, 0, -2]):
+        assert may_face(back.facing, back.vertices - np.array(eye)).all()

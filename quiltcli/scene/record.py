@@ -98,6 +98,27 @@ class Scene:
         return np.concatenate((normal.T, dot(normal, a)[None]))
 
     @cached_property
+    def facing(self) -> FloatArray:
+        """Cones (4, V) of the triangles' normals at every vertex: unit axis, and the sine of the half angle.
+
+        All triangles at a vertex p face away from an eye e where axis·(e − p) ≤ −sine·|e − p|. The sine is
+        1 where they face every way.
+        """
+        normal = self.planes[:3] / np.maximum(np.sqrt(dot(self.planes[:3].T, self.planes[:3].T)), 1e-300)
+        count = len(self.vertices)
+        axis = np.zeros((3, count))
+        for k in range(3):
+            for sums, values in zip(axis, normal, strict=True):
+                sums += np.bincount(self.triangles[:, k], weights=values, minlength=count)
+        axis /= np.maximum(np.sqrt(dot(axis.T, axis.T)), 1e-300)
+        least = np.ones(count)
+        for k in range(3):
+            corner = self.triangles[:, k]
+            np.minimum.at(least, corner, dot(axis.T.take(corner, axis=0), normal.T))
+        sine = np.where(least > 0, np.sqrt(np.maximum(1 - least * least, 0)), 1.0)
+        return np.concatenate((axis, sine[None]))
+
+    @cached_property
     def corner_normals(self) -> Float32Array:
         """What shading needs of a triangle's directions, side by side for one look-up (T, 12).
 
