@@ -148,7 +148,7 @@ def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
 
 
 def _halves_between(nodes: FloatArray) -> NDArray[np.float16]:
-    """As `half_floats` of `between_nodes`: there are fewer nodes than pixels to scale and to look for much."""
+    """As `half_floats` of `between_nodes`: there are fewer nodes than pixels to be scaled and limited."""
     scaled = between_nodes(nodes * _SCALE)
     if nodes.max(initial=0.0) * MOST_BETWEEN > MOST_HALF:
         np.minimum(scaled, _MOST_SCALED, out=scaled)

@@ -127,8 +127,23 @@ class Crew(Protocol):
     def clear(self, blocks: IntArray, buffers: Buffers) -> None:
         """Empty the pixels of blocks."""
 
-    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray) -> int:
-        """Draw batches, as `draw_batch`; how many pixels of facets show the scene."""
+    def draw(
+        self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
+    ) -> list[Drawn]:
+        """Draw batches, as `draw_batch`; `stale` are microtiles (M,) of all blocks."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What has been drawn of a batch.
+
+    Attributes:
+        visible: how many pixels of facets, bleed left out, show the scene.
+        tiles: (m,) microtiles of the batch's blocks that have pixels that do.
+    """
+
+    visible: int
+    tiles: BoolArray
 
 
 @dataclass(frozen=True)
@@ -146,16 +161,18 @@ class Threads:
         """Empty the pixels of blocks."""
         clear_blocks(self.stage, blocks, buffers)
 
-    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray) -> int:
-        """Draw batches, each in a thread; how many pixels of facets show the scene."""
+    def draw(
+        self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
+    ) -> list[Drawn]:
+        """Draw batches, each in a thread."""
 
-        def drawn(batch: tuple[int, int]) -> int:
-            return draw_batch(self.stage, frame, batch, buffers, stale[slice(*batch)])
+        def drawn(batch: tuple[int, int]) -> Drawn:
+            return draw_batch(self.stage, frame, batch, buffers, stale[self.stage.blocks.tiles(batch)])
 
         if self.threads == 1:
-            return sum(map(drawn, work))
+            return list(map(drawn, work))
         with ThreadPoolExecutor(self.threads) as pool:
-            return sum(pool.map(drawn, work))
+            return list(pool.map(drawn, work))
 
 
 def draw_frame(
@@ -176,7 +193,7 @@ def draw_frame(
         buffers: from `new_buffers`; overwritten where facets are drawn, emptied elsewhere.
         threads: batches drawn at a time; the pixels do not depend on it.
         only: (F,) facets to draw; the pixels of all others are left as they are.
-        dirty: (B,) blocks whose pixels may hold something, changed to those that do after this frame;
+        dirty: (M,) microtiles whose pixels may hold something, changed to those that do after this frame;
             all, where it is not known.
         crew: does the work instead of threads.
 
@@ -193,19 +210,25 @@ def draw_frame(
         binned = crew.bin(viewer, rays)
     frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
     written = frame.pairs.per_block > 0
-    stale = np.zeros(written.size, dtype=np.bool_)
+    stale = np.zeros(stage.blocks.used.size, dtype=np.bool_)
     with clock.stage("clear"):
         if only is None and dirty is not None:
-            stale = dirty & written & mends_itself(stage)
-            crew.clear(np.flatnonzero(dirty & ~stale), buffers)
+            mended = written & mends_itself(stage)
+            stale = dirty & mended.repeat(np.diff(stage.blocks.tile_start))
+            crew.clear(np.flatnonzero(stage.blocks.any_tile(dirty) & ~mended), buffers)
         else:
             clear(stage, buffers, only)
     with clock.stage("rasterize and shade"):
         if has_background(stage):
             written |= rays.lit[stage.blocks.facet]
-        visible = crew.draw(frame, batches(frame, written), buffers, stale)
+        work = batches(frame, written)
+        drawn = crew.draw(frame, work, buffers, stale)
+        visible = sum(batch.visible for batch in drawn)
         if dirty is not None:
-            dirty[:] = written if only is None else dirty | written
+            if only is None:
+                dirty[:] = False
+            for batch, done in zip(work, drawn, strict=True):
+                dirty[stage.blocks.tiles(batch)] |= done.tiles
     return FrameRecord(
         frame=viewer.frame,
         triangles=binned.triangles,
@@ -272,7 +295,9 @@ def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
             np.copyto(pixels, value, where=mine, casting="same_kind")
 
 
-def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, stale: BoolArray) -> int:
+def draw_batch(
+    stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, stale: BoolArray
+) -> Drawn:
     """Draw one batch into the buffers; its pixels belong to no other batch.
 
     Args:
@@ -280,10 +305,8 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
         frame: the frame.
         batch: the range of blocks.
         buffers: written to.
-        stale: blocks of the range that still hold another frame and have to be emptied where nothing is seen.
-
-    Returns:
-        How many pixels of facets, bleed left out, show the scene.
+        stale: (m,) microtiles of these blocks that still hold another frame and have to be emptied where
+            nothing is seen.
     """
     frame = ordered(stage, frame)
     block = np.arange(*batch)
@@ -299,21 +322,25 @@ def draw_batch(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buff
     visible = 0
     drawing = draw(frame, batch)
     if stale.any():
-        empty_missed(stage, drawing, np.flatnonzero(stale) + batch[0], buffers)
+        empty_missed(stage, drawing, np.flatnonzero(stale) + stage.blocks.tiles(batch).start, buffers)
     shader = NodeShader(stage.scene, frame.viewer.eye) if "rgba" in channels else None
     for hits in drawing.hits(wanted, shader):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)
         visible += hits.inside
+    tiles = np.ones_like(stale)
+    if mends_itself(stage):
+        tiles[:] = False
+        tiles[drawing.drawn() - stage.blocks.tiles(batch).start] = True
     drawing.done()
-    return visible
+    return Drawn(visible, tiles)
 
 
-def empty_missed(stage: Stage, drawing: Drawing, block: IntArray, buffers: Buffers) -> None:
-    """Empty the pixels of these blocks at which the drawing shows nothing."""
+def empty_missed(stage: Stage, drawing: Drawing, tiles: IntArray, buffers: Buffers) -> None:
+    """Empty the pixels of these microtiles at which the drawing shows nothing."""
     empty = {name: np.full(1, value, buffers[name].dtype) for name, value in empty_values(stage).items()}
-    for places in drawing.missed(block):
+    for places in drawing.missed(tiles):
         for name, value in empty.items():
             places.put(buffers[name], value)
 

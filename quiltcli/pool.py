@@ -20,6 +20,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from multiprocessing.connection import Connection, wait
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from numpy.typing import NDArray
 
 from quiltcli.binframe import Binned, BinPlan, Seen, Share, bin_frame, bin_share, join, see_vertices, sight_of
 from quiltcli.channels import exr_channels
-from quiltcli.draw import Buffers, Stage, Threads, clear_blocks, draw_batch, plan_of
+from quiltcli.draw import Buffers, Drawn, Stage, Threads, clear_blocks, draw_batch, plan_of
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
 from quiltcli.homography import QuiltRays, quilt_rays
@@ -229,19 +230,19 @@ class Pool:
         parts = [part for part in np.array_split(blocks, _SHARES * len(self._workers)) if part.size]
         self._share_out(_Item("clear", (part, index)) for part in parts)
 
-    def draw(self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray) -> int:
-        """Draw batches into one of the pool's buffers, as `draw.draw_batch`.
-
-        Returns:
-            How many pixels of facets show the scene.
-        """
+    def draw(
+        self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
+    ) -> list[Drawn]:
+        """Draw batches into one of the pool's buffers, as `draw.draw_batch`."""
         pairs = frame.pairs
         if pairs.memory is not self._arena.pairs.memory:
             return Threads(self._stage, len(self._workers)).draw(frame, work, buffers, stale)
         index = self._index(buffers)
         cost = [int(pairs.per_block[first:last].sum()) for first, last in work]
         dearest = np.argsort(cost, kind="stable")[::-1].tolist()
-        return sum(self._share_out(_Item("draw", (work[i], index, stale[slice(*work[i])])) for i in dearest))
+        tiles = self._stage.blocks.tiles
+        done = self._share_out(_Item("draw", (work[i], index, stale[tiles(work[i])])) for i in dearest)
+        return [one for _, one in sorted(zip(dearest, done, strict=True), key=itemgetter(0))]
 
     def _index(self, buffers: Buffers) -> int:
         return next(i for i, known in enumerate(self._buffers) if known is buffers)
@@ -309,8 +310,8 @@ class _Workplace:
         """Empty the pixels of some blocks."""
         clear_blocks(self._stage, blocks, self._buffers[index])
 
-    def draw(self, batch: tuple[int, int], index: int, stale: BoolArray) -> int:
-        """Draw a batch; its visible pixels."""
+    def draw(self, batch: tuple[int, int], index: int, stale: BoolArray) -> Drawn:
+        """Draw a batch."""
         if self._frame is None:
             seen, plan, stage = self._arena.seen, self.plan, self._stage
             sight = sight_of(stage.scene, seen, culling=plan.culling)

@@ -168,7 +168,7 @@ def render_frames(
         listener.begin(len(viewers))
         request = ends.enter_context(stop_between_frames())
         writer = ends.enter_context(Writer(ready, threads, listener, start))
-        dirty = [np.zeros(stage.blocks.facet.size, dtype=np.bool_) for _ in sheets]
+        dirty = [np.zeros(stage.blocks.used.size, dtype=np.bool_) for _ in sheets]
         for number, viewer in enumerate(viewers):
             request.check()
             turn = number % len(sheets)

@@ -38,7 +38,7 @@ PROBES = {
 def done(stage: Stage) -> Counter[str]:
     """Counts of one frame into empty buffers."""
     buffers = new_buffers(stage)
-    clean = np.zeros(stage.blocks.facet.size, bool)
+    clean = np.zeros(stage.blocks.used.size, bool)
     with counted(PROBES) as counts:
         draw_frame(stage, EYE, buffers, dirty=clean)
     counts["evaluated"] = counts["small"] + counts["large"]
@@ -150,12 +150,27 @@ def test_unlit_facets_cost_nothing():
 def test_only_what_was_drawn_is_cleared():
     stage = stage_of_facets(lit_and_dark(40), ball_scene(3))
     buffers = new_buffers(stage)
-    drawn_before = stage.blocks.facet == 3  # behind the wall: nothing will be drawn there
+    tiles = np.diff(stage.blocks.tile_start)
+    dark = stage.blocks.facet == 3  # behind the wall: nothing will be drawn there
+    drawn_before = dark.repeat(tiles)
     with counted(PROBES) as counts:
         draw_frame(stage, EYE, buffers, dirty=(drawn := drawn_before.copy()))
-    rectangle = int((stage.blocks.width * stage.blocks.height)[drawn_before].sum())
+    rectangle = int((stage.blocks.width * stage.blocks.height)[dark].sum())
     assert counts["bytes"] == 12 * (rectangle + counts["hits"])
-    assert np.flatnonzero(drawn).tolist() == np.flatnonzero(stage.blocks.facet == 0).tolist()
+    assert set(stage.blocks.facet.repeat(tiles)[drawn]) == {0}
+    assert counts["hits"] / 64 <= np.count_nonzero(drawn) <= counts["hits"] / 10
+
+
+def test_only_what_was_drawn_is_emptied_where_something_is_drawn_again():
+    stage = stage_of_facets(lit_and_dark(0), ball_scene(3, radius=0.3))
+    buffers, dirty = new_buffers(stage), np.zeros(stage.blocks.used.size, bool)
+    draw_frame(stage, EYE, buffers, dirty=dirty)
+    asked = []
+    probe = {(draw, "empty_missed"): lambda _, stage, drawing, tiles, buffers: asked.append(tiles) or {}}
+    with counted(probe):
+        draw_frame(stage, EYE, buffers, dirty=dirty)
+    np.testing.assert_array_equal(np.concatenate(asked), np.flatnonzero(dirty))
+    assert dirty.sum() < 0.5 * dirty.size
 
 
 def test_culled_triangles_are_neither_binned_nor_drawn():

@@ -30,7 +30,7 @@ def stage():
 
 def test_workers_draw_the_same_pixels_as_one_process(stage):
     alone, together = new_buffers(stage), shared_buffers(stage)
-    dirty = np.zeros(stage.blocks.facet.size, bool)
+    dirty = np.zeros(stage.blocks.used.size, bool)
     with Pool(stage, [together], 3) as pool:
         for eye in EYES:
             one = draw_frame(stage, viewer(eye), alone)
@@ -47,7 +47,7 @@ def test_a_frame_does_not_show_the_frames_before_it(background):
     facets = display(vertices, triangles.tolist(), 60)
     stage = stage_of_facets(facets, ball_scene(2, 0.7, lamps, background), bleed=2)
     fresh, used = new_buffers(stage), shared_buffers(stage)
-    dirty = np.zeros(stage.blocks.facet.size, bool)
+    dirty = np.zeros(stage.blocks.used.size, bool)
     with Pool(stage, [used], 2) as pool:
         for eye in (*EYES, (2.0, 1.8, 3.2), (2.2, 1.7, 3.1)):
             for crew in (pool, None):

@@ -124,9 +124,14 @@ class Drawing:
         """What the pixels see, each of the batch at most once; whole microtiles with their colours."""
         return read_canvas(self.canvas, self.table, self.blocks, self.limits, self.bits, wanted, shader)
 
-    def missed(self, block: IntArray) -> Iterator[Places]:
-        """The pixels of facets that see nothing, in those of these blocks that have pairs."""
-        return missed_pixels(self.canvas, self.blocks, np.isin(self.canvas.block, block))
+    def missed(self, tiles: IntArray) -> Iterator[Places]:
+        """The pixels of facets that see nothing, in those of these microtiles whose blocks have pairs."""
+        return missed_pixels(self.canvas, self.blocks, tiles)
+
+    def drawn(self) -> IntArray:
+        """The microtiles of which pixels see something."""
+        canvas = self.canvas
+        return canvas.number[(canvas.touched | (canvas.filler > 0)) & canvas.used]
 
     def done(self) -> None:
         """Leave the drawing's memory to the next; nothing may be read from it any more."""

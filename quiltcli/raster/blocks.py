@@ -64,6 +64,16 @@ class Blocks:
     owned: NDArray[np.uint8]
     inside: NDArray[np.uint8]
 
+    def tiles(self, blocks: tuple[int, int]) -> slice:
+        """The microtiles of a range of blocks."""
+        first, last = blocks
+        return slice(int(self.tile_start[first]), int(self.tile_start[last]))
+
+    def any_tile(self, tiles: BoolArray) -> BoolArray:
+        """Blocks (B,) that have any of these microtiles (microtiles,)."""
+        count = np.concatenate(([0], np.cumsum(tiles)))
+        return np.asarray(np.diff(count.take(self.tile_start)) > 0)
+
 
 def facet_rectangles(layout: Layout, bleed: int) -> IntArray:
     """Pixel rectangles (F, 4) x0, y0, x1, y1 (exclusive) of the facets with their bleed, cut to the page."""

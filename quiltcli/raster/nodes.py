@@ -79,7 +79,7 @@ MOST_BETWEEN = float(np.abs(_WEIGHTS).sum(axis=0).max())
 
 
 def on_grids(nodes: FloatArray) -> FloatArray:
-    """Values (..., 9, G) at the nodes made ready for `between_nodes`, in place: every sum there is exact then.
+    """Values (..., 9, G) at the nodes made ready, in place, for `between_nodes`: sums there are exact then.
 
     The grid's step is 2⁻³⁸ of the greatest value of a microtile; weights and sums have less than 15 bits.
     Values (..., 1, G) that all nodes share stay as they are.

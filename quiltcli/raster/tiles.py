@@ -92,15 +92,18 @@ def owned_pixels(blocks: Blocks, tiles: Tiles, drawn: BoolArray) -> tuple[IntArr
     return pixel, address, int(np.count_nonzero(inside))
 
 
-def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: BoolArray) -> Iterator[Places]:
+def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: IntArray) -> Iterator[Places]:
     """The pixels of facets at which nothing was drawn.
 
     Args:
         canvas: what was drawn.
         blocks: the blocks.
-        wanted: (K,) the blocks of the canvas that are asked about.
+        wanted: those asked about among the microtiles of all blocks, ascending; others than the canvas's
+            are passed over.
     """
-    bare = np.flatnonzero(canvas.used & (canvas.filler == 0) & ~canvas.full & wanted[canvas.place])
+    asked = np.searchsorted(canvas.number, wanted)
+    asked = asked[np.append(canvas.number, -1).take(asked) == wanted]
+    bare = asked[(canvas.used & (canvas.filler == 0) & ~canvas.full).take(asked)]
     tiles = tiles_at(canvas, blocks, bare)
     empty = tiles.interior & ~canvas.touched[bare]
     for part in in_parts(np.flatnonzero(empty), _AT_A_TIME):

@@ -88,7 +88,7 @@ def _times(stage: Stage, viewer: Viewer, rounds: int, *, rivals: bool) -> Times:
     """Whole frames of ours with two workers; with `rivals` OpenGL's, triangles sorted or not."""
     buffers = (shared_buffers if can_fork() else new_buffers)(stage)
     frame = binned(stage, viewer).frame
-    dirty = np.ones(stage.blocks.facet.size, dtype=np.bool_)
+    dirty = np.ones(stage.blocks.used.size, dtype=np.bool_)
     contestants: dict[str, Callable[[], object]] = {}
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, [buffers], 2)) if can_fork() else None
@@ -103,6 +103,6 @@ def _times(stage: Stage, viewer: Viewer, rounds: int, *, rivals: bool) -> Times:
 def _stages(stage: Stage, viewer: Viewer) -> dict[str, float]:
     """Seconds by stage in one process, the second frame's: the first finds cold memory."""
     buffers = new_buffers(stage)
-    dirty = np.ones(stage.blocks.facet.size, dtype=np.bool_)
+    dirty = np.ones(stage.blocks.used.size, dtype=np.bool_)
     draw_frame(stage, viewer, buffers, dirty=dirty)
     return stage_seconds(lambda: draw_frame(stage, viewer, buffers, dirty=dirty))

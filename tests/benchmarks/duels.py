@@ -70,7 +70,7 @@ def duel(name: str, rounds: int, scratch: Path, *, quick: bool = False) -> dict[
     kinds = {"culled": culled(stage), "two-sided": stage}
     works = {kind: binned(made, viewer) for kind, made in kinds.items()}
     buffers = (shared_buffers if can_fork() else new_buffers)(stage)
-    dirty = np.ones(stage.blocks.facet.size, dtype=np.bool_)
+    dirty = np.ones(stage.blocks.used.size, dtype=np.bool_)
     rays = list(pixel_rays(stage, works["two-sided"].frame))
     counts: dict[str, Any] = {"lit pixels": sum(map(len, rays))}
     with ExitStack() as ends:
@@ -174,7 +174,7 @@ def _whole_mesh(place: Place, stage: Stage) -> dict[str, dict[str, list[float]]]
     stage, viewer = with_mesh(stage, place, meshes.detailed(WHOLE_MESH)), viewer_of(place)
     buffers = (shared_buffers if can_fork() else new_buffers)(stage)
     frame = binned(stage, viewer).frame
-    dirty = np.ones(stage.blocks.facet.size, dtype=np.bool_)
+    dirty = np.ones(stage.blocks.used.size, dtype=np.bool_)
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, [buffers], 2)) if can_fork() else None
         quilt = ends.enter_context(opengl.Quilt(stage, frame, culling=False))
