@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from quiltcli.geometry import FloatArray
 from quiltcli.raster.hits import Hits, Wanted
-from quiltcli.raster.nodes import MOST_BETWEEN, between_nodes
+from quiltcli.raster.nodes import NodeColors
 from quiltcli.scene import Scene
 from quiltcli.shading import MOST_HALF, shading_normals, shading_wants
 from quiltcli.tileshading import pixel_colors
@@ -53,7 +53,7 @@ def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Sequence[Values]:
     if hits.colors is None:
         colors = list(map(half_floats, pixel_colors(scene, viewer.eye, hits)))
     else:
-        colors = list(map(_halves_between, hits.colors))
+        colors = _halves_between(hits.colors)
     return *colors * (3 // len(colors)), np.ones((1, 1), dtype=np.float16)
 
 
@@ -147,12 +147,13 @@ def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
     return _rounded(np.minimum(scaled, _MOST_SCALED, out=scaled))
 
 
-def _halves_between(nodes: FloatArray) -> NDArray[np.float16]:
-    """As `half_floats` of `between_nodes`: there are fewer nodes than pixels to be scaled and limited."""
-    scaled = between_nodes(nodes * _SCALE)
-    if nodes.max(initial=0.0) * MOST_BETWEEN > MOST_HALF:
-        np.minimum(scaled, _MOST_SCALED, out=scaled)
-    return _rounded(scaled)
+def _halves_between(colors: NodeColors) -> list[NDArray[np.float16]]:
+    """As `half_floats` of its pixels: there are fewer nodes than pixels to be scaled and limited."""
+    scaled = colors.pixels(_SCALE)
+    if colors.most > MOST_HALF:
+        for values in scaled:
+            np.minimum(values, _MOST_SCALED, out=values)
+    return list(map(_rounded, scaled))
 
 
 def _rounded(scaled: NDArray[np.float32]) -> NDArray[np.float16]:

@@ -1,9 +1,8 @@
-"""Shading whole microtiles by nine points each.
+"""Shading whole microtiles, and squares of them, by nine points each.
 
-Across the 8 × 8 pixels of a microtile that one triangle fills, light hardly ever changes in a way that a
-polynomial of second degree cannot follow. Where that is sure, colours are worked out at the nine nodes
-alone, and the polynomial between them is closer to the others than half floats can tell. Everything
-else is shaded pixel by pixel.
+Across a few pixels of one triangle light hardly ever changes in a way that a polynomial of second degree
+cannot follow. Where that is sure, colours are worked out at the nine nodes alone, and the polynomial
+between them is closer to the others than half floats can tell. Everything else is shaded pixel by pixel.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.raster import Hits, WholeTiles
-from quiltcli.raster.nodes import between_nodes, centre, centre_of, on_grids, reach, reach_of
+from quiltcli.raster.nodes import NodeColors
 from quiltcli.scene import Scene
 from quiltcli.shading import alpha, shade
 
 _CALM = 24.0
-"""A function is calm in a microtile that reaches a 24th of the way to the function's nearest pole."""
+"""A function is calm in a square that reaches a 24th of the way to the function's nearest pole."""
 
 _FLOOR = 1 / 64
 """Where cosines are smaller, single precision is too coarse for a polynomial."""
@@ -29,7 +28,7 @@ _FLOOR = 1 / 64
 def pixel_colors(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]:
     """As `shading.shade`, of hits whose colours may be known at nodes; one array where all is grey."""
     if hits.colors is not None:
-        return tuple(map(between_nodes, hits.colors))
+        return tuple(hits.colors.pixels())
     colors = shade(scene, eye, hits.points)
     return colors[:1] if _is_grey(colors) else colors
 
@@ -45,34 +44,36 @@ class NodeShader:
     scene: Scene
     eye: FloatArray
 
-    def colors(self, tiles: WholeTiles) -> FloatArray:
-        """Colours (1 or 3, 9, G) at the nodes, or (1 or 3, 1, G) where no pixel differs from another."""
-        colors = shade(self.scene, self.eye, tiles.at_nodes())
+    def colors(self, squares: WholeTiles) -> NodeColors:
+        """Colours at the nodes of S squares."""
+        colors = shade(self.scene, self.eye, squares.at_nodes())
         known = colors[:1] if _is_grey(colors) else colors
-        nodes = np.empty((len(known), max(map(len, known)), tiles.triangle.size))
+        nodes = np.empty((len(known), max(map(len, known)), squares.triangle.size))
         for values, color in zip(nodes, known, strict=True):
             values[:] = color
-        return on_grids(nodes)
+        return NodeColors(squares.nodes.on_grids(nodes), squares.nodes)
 
-    def calm(self, tiles: WholeTiles) -> BoolArray:
-        """Which microtiles (G,) have no glint, no shadow's edge and no grazing view in or near them.
+    def calm(self, squares: WholeTiles) -> BoolArray:
+        """Which squares (S,) have no glint, no shadow's edge and no grazing view in or near them.
 
         Light is made of few functions: the lengths of vectors, Schlick's and Smith's of the angle between
         normal and eye or lamp, and GGX's of the angle between normal and half vector, all with poles or
         kinks that are known. What a polynomial misses falls with the third power of the distance to them.
         """
-        assert tiles.normal is not None
-        ray, normal = centre(tiles.rays.vectors), centre(tiles.normal)
+        assert squares.normal is not None
+        nodes, rays = squares.nodes, squares.rays.vectors
+        ray, normal = nodes.middle_vectors(rays), nodes.middle_vectors(squares.normal)
         ray_over, normal_over = _over_length(ray), _over_length(normal)
         eye, normal = -ray * ray_over, normal * normal_over
-        eye_turn, normal_turn = reach(tiles.rays.vectors) * ray_over, reach(tiles.normal) * normal_over
-        depth_turn = reach_of(tiles.inverse) / centre_of(tiles.inverse)
+        eye_turn = nodes.vectors_reach(rays) * ray_over
+        normal_turn = nodes.vectors_reach(squares.normal) * normal_over
+        depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse)
         nv = _dot(normal, eye)
         result: BoolArray = nv > np.maximum(_CALM * (eye_turn + normal_turn), _FLOOR)
-        if tiles.rays.placed or len(tiles.weights):
+        if squares.rays.placed or len(squares.weights):
             result &= _CALM * depth_turn < 1
-        rough = alpha(self.scene, tiles.triangle)
-        for lamp, lamp_turn in self._lamps(tiles, eye, eye_turn, eye_turn + depth_turn):
+        rough = alpha(self.scene, squares.triangle)
+        for lamp, lamp_turn in self._lamps(squares, eye, eye_turn, eye_turn + depth_turn):
             nl = _dot(normal, lamp)
             half2 = np.maximum(1 + _dot(eye, lamp), 1e-12)  # 2 (v·h)²
             sine2 = np.maximum(1 - np.maximum(nv + nl, 0) ** 2 / (2 * half2), 0)  # of the angle n, h
@@ -82,18 +83,18 @@ class NodeShader:
             result &= np.abs(nl) > np.maximum(lamp_reach, _FLOOR)
             result &= half2 > 2 * (_CALM * (eye_turn + lamp_turn)) ** 2
             result &= (pole2 > half_reach**2) & (pole2 * half2 > 2 * _FLOOR)
-        return np.broadcast_to(result, tiles.triangle.shape)
+        return np.broadcast_to(result, squares.triangle.shape)
 
     def _lamps(
-        self, tiles: WholeTiles, eye: FloatArray, eye_turn: FloatArray, move: FloatArray
+        self, squares: WholeTiles, eye: FloatArray, eye_turn: FloatArray, move: FloatArray
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Unit directions (3, G) or (3, 1) to the lamps, and the angle (G,) or (1,) they turn by.
+        """Unit directions (3, S) or (3, 1) to the lamps, and the angle (S,) or (1,) they turn by.
 
         Args:
-            tiles: G microtiles.
-            eye: (3, G) unit directions to the eye.
-            eye_turn: (G,) the angle they turn by.
-            move: (G,) how far points of the microtiles are from their middle, over their distance.
+            squares: S squares.
+            eye: (3, S) unit directions to the eye.
+            eye_turn: (S,) the angle they turn by.
+            move: (S,) how far points of the squares are from their middle, over their distance.
         """
         lights = self.scene.lights
         for direction in lights.directional_direction:
@@ -101,7 +102,7 @@ class NodeShader:
         if lights.headlight:
             yield eye, eye_turn
         if len(lights.point_position):
-            point = centre_of(tiles.rays.axes) / centre_of(tiles.inverse)
+            point = squares.nodes.middle(squares.rays.axes) / squares.nodes.middle(squares.inverse)
             distance = np.sqrt(_dot(point, point))
             for place in lights.point_position:
                 offset = (place - self.eye)[:, None] - point

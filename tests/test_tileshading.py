@@ -12,10 +12,12 @@ from wallscene import lights, wall
 from quiltcli.channels import CHANNELS, half_floats
 from quiltcli.draw import draw_frame, new_buffers
 from quiltcli.geometry import normalized
-from quiltcli.raster.nodes import at_nodes, between_nodes, on_grids
+from quiltcli.raster.nodes import Nodes
+from quiltcli.raster.planes import moved
 from quiltcli.raster.reader import TileRays
 from quiltcli.raster.tiles import Tiles
 from quiltcli.raster.vectors import BASIS, BlockVectors, TileVectors, on_grid
+from quiltcli.raster.visibility import SQUARE
 from quiltcli.raster.whole import WholeTiles
 from quiltcli.shading import shade
 from quiltcli.tileshading import NodeShader, pixel_colors
@@ -34,8 +36,8 @@ def planes(centre, reach, rng):
     return np.stack((a.T, b.T, (centre - 3.5 * (a + b)).T), axis=1)
 
 
-def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False):
-    """Microtiles that see anything from anywhere, every other one a surface near the lamp's image."""
+def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False, side=1):
+    """Squares of microtiles that see anything from anywhere, some of them surfaces near the lamp's image."""
     rays = planes(normalized(rng.normal(size=(COUNT, 3))), 10 ** rng.uniform(-4, -0.5, (COUNT, 1)), rng)
     towards = -(rays[:, 2] + 3.5 * (rays[:, 0] + rays[:, 1])).T
     spread = 10 ** rng.uniform(-4, 0, (COUNT, 1))
@@ -43,39 +45,60 @@ def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False):
     normal = normalized(middle + rng.normal(size=(COUNT, 3)) * spread)
     normal *= np.sign((normal * towards).sum(axis=1))[:, None]
     turn = 10 ** rng.uniform(-4, -0.5, (COUNT, 1)) * bent
-    none = np.zeros(COUNT, np.int64)
-    vectors = BlockVectors(rays, np.arange(COUNT), none, none)
+    normals = planes(normal, turn, rng)
     inverse = np.stack([rng.normal(size=COUNT) * 10 ** rng.uniform(-5, -2, COUNT) for _ in range(3)])
     inverse[2] += 1
     weights = np.stack((inverse * 0.2, inverse * 0.3, inverse)) if colored else np.zeros((0, 3, COUNT))
     if colored:
         weights[:2, :2] += rng.normal(size=(2, 2, COUNT)) * 0.01
-    rayed = on_grid(vectors.planes) if placed else np.zeros((0, 3, COUNT))
+    # The same over a larger square, and from the first pixels of its microtiles.
+    rays[:, :2] /= side
+    square = np.repeat(np.arange(COUNT), side**2)
+    y, x = (8 * np.tile(place, COUNT) for place in np.divmod(np.arange(side**2), side))
+
+    def spread_out(plane):
+        plane[..., :2, :] /= side
+        return moved(plane[..., square], x, y)
+
+    vectors = BlockVectors(rays, square, x, y)
+    none = np.zeros(square.size, np.int64)
     return WholeTiles(
         tiles=Tiles(*[none] * 9),
-        triangle=np.zeros(COUNT, np.int32),
-        rays=TileRays(vectors, on_grid(vectors.along([0, 0, 1.0])), rayed, radial=False, placed=placed),
-        inverse=on_grid(inverse),
-        normal=TileVectors(planes(normal, turn, rng)),
-        weights=on_grid(weights),
+        triangle=np.zeros(square.size, np.int32),
+        rays=TileRays(
+            vectors,
+            on_grid(vectors.along(np.array([0, 0, 1.0]))),
+            on_grid(vectors.planes) if placed else np.zeros((0, 3, square.size)),
+            radial=False,
+            placed=placed,
+        ),
+        inverse=on_grid(spread_out(inverse)),
+        normal=TileVectors(spread_out(normals)),
+        weights=on_grid(spread_out(weights)),
         border=None,
+        side=side,
     )
 
 
 def relative_errors(scene, some):
     """How far microtiles (n, 64) shaded at nodes are from pixel by pixel, over the value, of all colours."""
     exact = shade(scene, EYE, some.hits(None).points)
-    found = pixel_colors(scene, EYE, some.hits(NodeShader(scene, EYE).colors(some)))
-    found *= 3 // len(found)
-    return np.stack(
-        [np.abs(f.astype(float) - e) / np.maximum(e, 1e-4) for f, e in zip(found, exact, strict=True)]
-    )
+    found = pixel_colors(scene, EYE, some.hits(NodeShader(scene, EYE).colors(some.squares)))
+    pairs = zip(found * (3 // len(found)), exact, strict=True)
+    return np.stack([np.abs(f.astype(float) - e) / np.maximum(e, 1e-4) for f, e in pairs])
+
+
+def calm_ones(scene, some):
+    """The microtiles of calm squares, and how many squares these are."""
+    calm = np.flatnonzero(NodeShader(scene, EYE).calm(some.squares))
+    count = some.side**2
+    return some[(calm[:, None] * count + np.arange(count)).reshape(-1)], calm.size
 
 
 @pytest.mark.parametrize("lamp_is", ["sun", "eye", "point"])
 @pytest.mark.parametrize("roughness", [0.0, 0.3, 0.5, 1.0])
-@pytest.mark.parametrize("metallic", [0.0, 1.0])
-def test_calm_microtiles_are_nearer_than_half_floats_tell(lamp_is, roughness, metallic):
+@pytest.mark.parametrize(("metallic", "side"), [(0.0, 1), (1.0, 1), (0.5, SQUARE)])
+def test_calm_squares_are_nearer_than_half_floats_tell(lamp_is, roughness, metallic, side):
     rng = np.random.default_rng(5)
     checked = 0
     for bent in (False, True):
@@ -87,10 +110,11 @@ def test_calm_microtiles_are_nearer_than_half_floats_tell(lamp_is, roughness, me
                 "point": lights(point=rng.normal(size=(2, 3)), power=[[3, 2, 1], [1, 1, 1]]),
             }
             scene = wall(lamps[lamp_is], color=(0.9, 0.5, 0.2), metallic=metallic, roughness=roughness)
-            some = tiles(rng, lamp, bent=bent, near_glint=near_glint, placed=lamp_is == "point")
-            calm = np.flatnonzero(NodeShader(scene, EYE).calm(some))
-            checked += calm.size
-            assert relative_errors(scene, some[calm]).max(initial=0) < STEP / 4
+            placed = lamp_is == "point"
+            some = tiles(rng, lamp, bent=bent, near_glint=near_glint, placed=placed, side=side)
+            calm, count = calm_ones(scene, some)
+            checked += count
+            assert relative_errors(scene, calm).max(initial=0) < STEP / 4
     assert checked > COUNT / 5
 
 
@@ -100,9 +124,9 @@ def test_vertex_colours_are_calm_too():
     scene = wall(lights([-lamp], [[1, 1, 1]]))
     scene = replace(scene, colors=np.float32([[1, 0.2, 0.1], [0.1, 1, 0.4], [0.3, 0.3, 1]]))
     some = tiles(rng, lamp, bent=False, near_glint=False, colored=True)
-    calm = np.flatnonzero(NodeShader(scene, EYE).calm(some))
-    assert calm.size > COUNT / 5
-    assert relative_errors(scene, some[calm]).max() < STEP / 4
+    calm, count = calm_ones(scene, some)
+    assert count > COUNT / 5
+    assert relative_errors(scene, calm).max() < STEP / 4
 
 
 def test_a_glint_between_the_nodes_is_not_calm():
@@ -116,17 +140,23 @@ def test_a_glint_between_the_nodes_is_not_calm():
     assert not NodeShader(scene, EYE).calm(some)[wide].any()
 
 
-def test_a_polynomial_of_second_degree_is_its_own():
-    x, y, _ = BASIS
+@pytest.mark.parametrize("side", [1, 2, SQUARE])
+def test_a_polynomial_of_second_degree_is_its_own(side):
+    nodes = Nodes(side)
+    first = np.arange(side) * 8.0
+    corner = np.stack((np.tile(first, side), np.repeat(first, side)))[:, :, None]
+    x, y = ((corner + BASIS[:2, None]) / (8 * side)).reshape(2, -1)
     rng = np.random.default_rng(8)
     c = rng.normal(size=(COUNT, 3, 3))
-    powers = np.stack((np.ones(64), x, x * x)), np.stack((np.ones(64), y, y * y))
-    expected = np.einsum("gij,ip,jp->gp", c, *powers)
-    places = [at_nodes(np.array(plane)[:, None])[:, 0] for plane in ([1.0, 0, 0], [0.0, 1, 0])]
-    at = np.stack((np.ones(9), places[0], places[0] ** 2)), np.stack((np.ones(9), places[1], places[1] ** 2))
-    nodes = np.einsum("gij,ip,jp->pg", c, *at).astype(np.float32)
-    largest = np.abs(nodes).max(axis=0)[:, None]
-    assert (np.abs(between_nodes(on_grids(nodes.astype(float))) - expected) <= 4 * 2.0**-23 * largest).all()
+
+    def at(x, y):
+        return np.einsum("gij,ip,jp->gp", c, x ** np.arange(3)[:, None], y ** np.arange(3)[:, None])
+
+    columns, rows = (nodes.at(np.array(plane)[:, None])[:, 0] for plane in ([1.0, 0, 0], [0.0, 1, 0]))
+    values = at(columns / (8 * side), rows / (8 * side)).astype(np.float32).T
+    largest = np.abs(values).max(axis=0)[:, None]
+    got = nodes.between(nodes.on_grids(values.astype(float))).reshape(COUNT, -1)
+    assert (np.abs(got - at(x, y)) <= 8 * 2.0**-23 * largest).all()
 
 
 @pytest.mark.parametrize("color", [(1e-6, 0.3, 7.0), (60000.0, 65504.0, 1e6)])
@@ -149,13 +179,13 @@ def test_no_microtile_depends_on_its_company():
     some = tiles(rng, lamp, bent=True, near_glint=False)
     shader = NodeShader(scene, EYE)
     calm, colors = shader.calm(some), shader.colors(some)
-    pixels = [between_nodes(color) for color in colors]
+    pixels = colors.pixels()
     for part in (slice(3, 4), slice(17, 60), np.array([5, 400, 7])):
         np.testing.assert_array_equal(shader.calm(some[part]), calm[part])
         alone = shader.colors(some[part])
-        np.testing.assert_array_equal(alone, colors[:, :, part])
-        for mine, all_of_them in zip(alone, pixels, strict=True):
-            np.testing.assert_array_equal(between_nodes(mine), all_of_them[part])
+        np.testing.assert_array_equal(alone.values, colors.values[:, :, part])
+        for mine, all_of_them in zip(alone.pixels(), pixels, strict=True):
+            np.testing.assert_array_equal(mine, all_of_them[part])
 
 
 def test_a_frame_is_the_same_to_within_one_step_of_its_half_floats(monkeypatch):
@@ -163,13 +193,19 @@ def test_a_frame_is_the_same_to_within_one_step_of_its_half_floats(monkeypatch):
     stage = stage_for(replace(place, facets=display(CUBE, CUBE_FACES[:5], 300)), room(2))
     viewer = viewer_of(place)
     by_nodes, by_pixels = new_buffers(stage), new_buffers(stage)
-    calm = []
+    calm = {1: 0, SQUARE: 0}
     asked = NodeShader.calm
-    monkeypatch.setattr(NodeShader, "calm", lambda *given: calm.append(asked(*given)) or calm[-1])
+
+    def watched(shader, squares):
+        found = asked(shader, squares)
+        calm[squares.side] += np.count_nonzero(found)
+        return found
+
+    monkeypatch.setattr(NodeShader, "calm", watched)
     draw_frame(stage, viewer, by_nodes)
     monkeypatch.setattr(NodeShader, "calm", lambda _, some: np.zeros(some.triangle.size, bool))
     draw_frame(stage, viewer, by_pixels)
-    assert np.concatenate(calm).sum() > 1000
+    assert min(calm.values()) > 200
     for name, pixels in by_pixels.items():
         if name in "RGB":
             steps = by_nodes[name].view(np.int16).astype(int) - pixels.view(np.int16)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.raster.nodes import NodeColors
 from quiltcli.raster.vectors import PointVectors, Vectors
 
 RUN = 8
@@ -110,9 +111,8 @@ class Hits:
         weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
         position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
         inside: how many of the drawn pixels lie in their facet's polygon, not in its bleed.
-        colors: grey, or red, green and blue, at the nodes of the microtiles, (1 or 3, 9, G), or for whole
-            microtiles (1 or 3, 1, G), as `nodes.between_nodes` takes them; None where pixels are to be
-            shaded one by one.
+        colors: those at the nodes of microtiles, or of squares of them; None where pixels are to be shaded
+            one by one.
     """
 
     places: Places
@@ -125,7 +125,7 @@ class Hits:
     weights: Float32Array | None
     position: FloatArray | None
     inside: int
-    colors: FloatArray | None = None
+    colors: NodeColors | None = None
 
     @property
     def points(self) -> Points:

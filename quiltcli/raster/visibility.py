@@ -24,6 +24,8 @@ from quiltcli.raster.tiles import Tiles, in_parts, owned_pixels, tiles_at
 from quiltcli.raster.whole import TileShader, tile_hits, whole_tiles
 
 _WHOLE, _PIXELS = 4096, 512  # microtiles at a time
+SQUARE = 4
+"""Microtiles from side to side of the squares that are looked for: a power of two."""
 
 
 def read_canvas(
@@ -57,10 +59,20 @@ def read_canvas(
     if wanted.normals is not None:
         is_even = has_one_normal(wanted.normals, triangle)
     border = ~tiles.interior[whole]
-    for at_border, even in ((False, True), (False, False), (True, True), (True, False)):
-        chosen = whole[(border == at_border) & (is_even == even)]
-        for some in in_parts(chosen, _WHOLE):
-            found = whole_tiles(reader, tiles[some], serial[some], even=even, border=at_border)
+    squares = np.zeros(0, dtype=np.int64)
+    if shader is not None:
+        squares = _squares(canvas, tiles, np.where(border, -1, serial[whole]), whole)
+    alone = np.ones(whole.size, dtype=np.bool_)
+    alone[squares] = False
+    kinds = [(squares[is_even[squares] == even], even, False, SQUARE) for even in (True, False)]
+    kinds += [
+        (np.flatnonzero(alone & (border == at_border) & (is_even == even)), even, at_border, 1)
+        for at_border in (False, True)
+        for even in (True, False)
+    ]
+    for chosen, even, at_border, side in kinds:
+        for some in in_parts(whole[chosen], _WHOLE):
+            found = whole_tiles(reader, tiles[some], serial[some], even=even, border=at_border, side=side)
             yield from tile_hits(found, shader)
     for part in in_parts(np.flatnonzero(complete), _PIXELS):
         yield _complete_tiles(reader, tiles[part])
@@ -68,6 +80,37 @@ def read_canvas(
         hits = _scattered_pixels(reader, tiles[part])
         if hits.triangle.size:
             yield hits
+
+
+def _squares(canvas: Canvas, tiles: Tiles, serial: IntArray, whole: IntArray) -> IntArray:
+    """Microtiles that together are squares of SQUARE by SQUARE filled by one pair.
+
+    Args:
+        canvas: the canvas.
+        tiles: where microtiles lie.
+        serial: (n,) the pair that fills each of `whole`, −1 for none.
+        whole: (n,) indices into `tiles`.
+
+    Returns:
+        (S·SQUARE²,) places in `whole`, square by square, each row by row.
+    """
+    filled = np.full(canvas.touched.size, -1, dtype=np.int64)
+    place = np.zeros(canvas.touched.size, dtype=np.int64)
+    index, block = tiles.index[whole], tiles.block[whole]
+    filled[index], place[index] = serial, np.arange(whole.size)
+    across, down = canvas.tiles_across.take(block), canvas.tiles_down.take(block)
+    column, row = tiles.x[whole] >> 3, tiles.y[whole] >> 3
+    first = (serial >= 0) & ((column | row) & (SQUARE - 1) == 0)
+    first &= (column + SQUARE <= across) & (row + SQUARE <= down)
+    first = np.flatnonzero(first)
+    same = np.ones(first.size, dtype=np.bool_)
+    corner, step, pair = index[first], across[first], serial[first]
+    for y in range(SQUARE):
+        for x in range(SQUARE):
+            same &= filled.take(corner + y * step + x, mode="clip") == pair
+    corner, step = corner[same, None, None], step[same, None, None]
+    cells = corner + np.arange(SQUARE)[:, None] * step + np.arange(SQUARE)
+    return place.take(cells.reshape(-1))
 
 
 def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:

@@ -11,7 +11,7 @@ import numpy as np
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
 from quiltcli.raster.blocks import Blocks
 from quiltcli.raster.hits import Hits, Places, Points
-from quiltcli.raster.nodes import at_nodes, vectors_at_nodes
+from quiltcli.raster.nodes import NodeColors, Nodes, nodes_of
 from quiltcli.raster.planes import moved
 from quiltcli.raster.reader import Reader, TileRays, rays_through
 from quiltcli.raster.surfaces import one_normal, surfaces
@@ -34,6 +34,8 @@ class WholeTiles:
         weights: (3, 3, G) planes, on grids, of the second and third edge function and of the sum of all;
             none unless wanted, (0, 3, G).
         border: the blocks, where some pixels are not the facet's; None where all are.
+        side: how many microtiles are the side of a square of them that is filled by one triangle; squares
+            come one after the other, each row by row.
     """
 
     tiles: Tiles
@@ -43,6 +45,7 @@ class WholeTiles:
     normal: Vectors | None
     weights: FloatArray
     border: Blocks | None
+    side: int = 1
 
     def __getitem__(self, part: slice | IntArray) -> WholeTiles:
         """Some of the microtiles."""
@@ -54,26 +57,38 @@ class WholeTiles:
             normal=None if self.normal is None else self.normal[part],
             weights=self.weights[:, :, part],
             border=self.border,
+            side=self.side,
         )
 
+    @property
+    def nodes(self) -> Nodes:
+        """The nodes of the squares."""
+        return nodes_of(self.side)
+
+    @property
+    def squares(self) -> WholeTiles:
+        """The first microtile of every square: its planes are those of the square."""
+        return self[:: self.side**2]
+
     def at_nodes(self) -> Points:
-        """What is seen at the nodes of the microtiles."""
+        """What is seen at the nodes of `squares`."""
+        nodes = self.nodes
         weights = position = None
         if len(self.weights):
-            second, third, total = at_nodes(self.weights)
+            second, third, total = nodes.at(self.weights)
             weights = np.stack((second / total, third / total)).astype(np.float32)
         if self.rays.placed:
-            position = at_nodes(self.rays.axes) / at_nodes(self.inverse)
+            position = nodes.at(self.rays.axes) / nodes.at(self.inverse)
         return Points(
             triangle=self.triangle[None],
-            ray=vectors_at_nodes(self.rays.vectors),
-            normal=None if self.normal is None else vectors_at_nodes(self.normal),
+            ray=nodes.vectors(self.rays.vectors),
+            normal=None if self.normal is None else nodes.vectors(self.normal),
             weights=weights,
             position=position,
         )
 
-    def hits(self, colors: FloatArray | None) -> Hits:
-        """What their pixels see; `colors` are those at the nodes, as for `Hits`."""
+    def hits(self, colors: NodeColors | None) -> Hits:
+        """What their pixels see; `colors` are those at the nodes, if they are known."""
         inverse = grid_values(self.inverse)
         depth, position = self.rays.values()
         depth /= inverse
@@ -105,16 +120,18 @@ class WholeTiles:
 
 
 class TileShader(Protocol):
-    """Whoever can shade microtiles by their nodes."""
+    """Whoever can shade squares of microtiles by their nodes."""
 
-    def calm(self, tiles: WholeTiles) -> BoolArray:
-        """Which microtiles (G,) nodes tell enough of."""
+    def calm(self, squares: WholeTiles) -> BoolArray:
+        """Which squares (S,) nodes tell enough of."""
 
-    def colors(self, tiles: WholeTiles) -> FloatArray:
-        """Colours at the nodes of microtiles, as for `Hits`."""
+    def colors(self, squares: WholeTiles) -> NodeColors:
+        """Colours at the nodes of squares."""
 
 
-def whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool, border: bool) -> WholeTiles:
+def whole_tiles(
+    reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool, border: bool, side: int
+) -> WholeTiles:
     """Microtiles (G,) that one pair each fills.
 
     Args:
@@ -123,6 +140,7 @@ def whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool, b
         serial: (G,) the pairs.
         even: whether each of their triangles has one normal.
         border: whether some of their pixels are not the facet's.
+        side: the microtiles are squares of so many.
     """
     planes, wanted, handed = reader.table.planes, reader.wanted, reader.limits.handed
     rows = reader.table.row_of_serial.take(serial)
@@ -141,16 +159,33 @@ def whole_tiles(reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool, b
         normal=normal,
         weights=on_grid(seen.weights),
         border=reader.blocks if border else None,
+        side=side,
     )
 
 
 def tile_hits(tiles: WholeTiles, shader: TileShader | None) -> Iterator[Hits]:
-    """Hits of microtiles, a cache-sized number at a time; shaded at their nodes where that is enough."""
-    calm = np.zeros(tiles.triangle.size, dtype=np.bool_) if shader is None else shader.calm(tiles)
-    for some, by_nodes in ((calm, True), (~calm, False)):
-        if some.any():
-            chosen = tiles if some.all() else tiles[np.flatnonzero(some)]
-            colors = shader.colors(chosen) if shader is not None and by_nodes else None
-            for at in range(0, chosen.triangle.size, _AT_A_TIME):
-                part = slice(at, at + _AT_A_TIME)
-                yield chosen[part].hits(None if colors is None else colors[:, :, part])
+    """Hits of microtiles, a cache-sized number at a time; shaded at their nodes where that is enough.
+
+    Squares for which it is not are shaded by their microtiles.
+    """
+    squares = tiles.squares
+    count = tiles.side**2
+    calm = np.zeros(squares.triangle.size, dtype=np.bool_) if shader is None else shader.calm(squares)
+    if shader is not None and calm.any():
+        some = np.flatnonzero(calm)
+        chosen = tiles if some.size == calm.size else tiles[_members(some, count)]
+        yield from _in_parts(chosen, shader.colors(squares if some.size == calm.size else squares[some]))
+    if not calm.all():
+        rest = replace(tiles[_members(np.flatnonzero(~calm), count)], side=1)
+        yield from _in_parts(rest, None) if tiles.side == 1 else tile_hits(rest, shader)
+
+
+def _members(squares: IntArray, count: int) -> IntArray:
+    """The microtiles of squares (S,) of so many."""
+    return (squares[:, None] * count + np.arange(count)).reshape(-1)
+
+
+def _in_parts(tiles: WholeTiles, colors: NodeColors | None) -> Iterator[Hits]:
+    for at in range(0, tiles.triangle.size, _AT_A_TIME):
+        part = slice(at, min(at + _AT_A_TIME, tiles.triangle.size))
+        yield tiles[part].hits(None if colors is None else colors[part])
