@@ -184,9 +184,11 @@ def cut_batches(pair_counts: IntArray, blocks: Blocks, wanted: BoolArray) -> lis
         wanted: (B,) the blocks that must be in a batch; others cost nothing.
 
     Returns:
-        Ranges [first, last) of blocks; what they hold does not depend on the number of workers.
+        Ranges [first, last) of blocks; what they hold does not depend on the number of workers. Their pixels
+        are counted by microtiles that are drawn: the rectangle of a triangular facet is half empty.
     """
-    area = (blocks.width * blocks.height).tolist()
+    used = np.concatenate(([0], np.cumsum(blocks.used)))
+    area = (64 * np.diff(used.take(blocks.tile_start))).tolist()
     counts = pair_counts.tolist()
     batches = []
     first = pixels = pairs = 0
