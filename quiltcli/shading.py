@@ -24,11 +24,13 @@ from quiltcli.scene import Scene
 HEADLIGHT = 3.0
 # Lights have no size: below this roughness their image in a surface would be too bright for half floats.
 LEAST_ROUGHNESS = 0.09
+# Nearer to a point light than this, in metres, its light does not grow any more.
+LEAST_DISTANCE = 1e-3
 # The largest finite half float; brighter values are written as this.
 MOST_HALF = np.float32(65504)
 _DIELECTRIC = 0.04
 _LEAST_COSINE = np.float32(1e-4)
-_LEAST_DISTANCE2 = np.float32(1e-6)
+_LEAST_DISTANCE2 = np.float32(LEAST_DISTANCE**2)
 _LEAST_LENGTH2 = np.float32(1e-30)
 _ONE, _HALF, _ROOT2 = np.float32(1), np.float32(0.5), np.float32(math.sqrt(2))
 
@@ -144,7 +146,7 @@ def _points(scene: Scene, seen: Points) -> _Surface:
     base, ambient, emission = rows[0:3], rows[3:6], rows[6:9]
     diffuse, metallic, dielectric, specular90, coat, alpha2 = rows[9:15]
     if scene.corner_colors is not None:
-        color = _colors(scene.corner_colors, seen)
+        color = vertex_colors(scene.corner_colors, seen)
         base = tuple(v * c for v, c in zip(base, color, strict=True))
         ambient = tuple(v * c for v, c in zip(ambient, color, strict=True))
     steady = tuple(a + e for a, e in zip(ambient, emission, strict=True))
@@ -202,8 +204,8 @@ def _over_length(vectors: Vectors, sign: np.float32 = _ONE) -> Float32Array:
     return result
 
 
-def _colors(table: Float32Array, seen: Points) -> Float32Array:
-    """Vertex colours (3, n, k) between a triangle's corners."""
+def vertex_colors(table: Float32Array, seen: Points) -> Float32Array:
+    """Colours (3, n, k) between the corners of triangles, by the scene's `corner_colors`."""
     assert seen.weights is not None
     rows = _columns(table, seen.triangle)
     value: Float32Array = rows[3:6] * seen.weights[0]

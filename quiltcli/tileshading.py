@@ -16,10 +16,14 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.raster import Hits, WholeTiles
 from quiltcli.raster.nodes import NodeColors
 from quiltcli.scene import Scene
-from quiltcli.shading import alpha, shade
+from quiltcli.shading import LEAST_DISTANCE, alpha, shade, vertex_colors
 
 _CALM = 24.0
 """A function is calm in a square that reaches a 24th of the way to the function's nearest pole."""
+
+_MOST = np.float32(2.0**100)
+_VARIED = 8
+"""Vertex colours are calm where the brightest in a square is at most so many times the darkest."""
 
 _FLOOR = 1 / 64
 """Where cosines are smaller, single precision is too coarse for a polynomial."""
@@ -30,10 +34,11 @@ def pixel_colors(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Arra
     if hits.colors is not None:
         return tuple(hits.colors.pixels())
     colors = shade(scene, eye, hits.points)
-    return colors[:1] if _is_grey(colors) else colors
+    return colors[:1] if _are_one(colors) else colors
 
 
-def _is_grey(colors: tuple[Float32Array, ...]) -> bool:
+def _are_one(colors: tuple[Float32Array, ...]) -> bool:
+    """Whether red, green and blue are one array, as `shade` gives what is grey."""
     return all(color is colors[0] for color in colors)
 
 
@@ -47,10 +52,10 @@ class NodeShader:
     def colors(self, squares: WholeTiles) -> NodeColors:
         """Colours at the nodes of S squares."""
         colors = shade(self.scene, self.eye, squares.at_nodes())
-        known = colors[:1] if _is_grey(colors) else colors
+        known = colors[:1] if _are_one(colors) else colors
         nodes = np.empty((len(known), max(map(len, known)), squares.triangle.size))
         for values, color in zip(nodes, known, strict=True):
-            values[:] = color
+            values[:] = np.minimum(color, _MOST)  # sums with infinity would be no numbers
         return NodeColors(squares.nodes.on_grids(nodes), squares.nodes)
 
     def calm(self, squares: WholeTiles) -> BoolArray:
@@ -70,8 +75,11 @@ class NodeShader:
         depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse)
         nv = _dot(normal, eye)
         result: BoolArray = nv > np.maximum(_CALM * (eye_turn + normal_turn), _FLOOR)
-        if squares.rays.placed or len(squares.weights):
+        if len(self.scene.lights.point_position) or len(squares.weights):
             result &= _CALM * depth_turn < 1
+        if self.scene.corner_colors is not None:
+            hues = vertex_colors(self.scene.corner_colors, squares.at_nodes())
+            result &= (_VARIED * hues.min(axis=1) >= hues.max(axis=1)).all(axis=0)
         rough = alpha(self.scene, squares.triangle)
         for lamp, lamp_turn in self._lamps(squares, eye, eye_turn, eye_turn + depth_turn):
             nl = _dot(normal, lamp)
@@ -107,7 +115,9 @@ class NodeShader:
             for place in lights.point_position:
                 offset = (place - self.eye)[:, None] - point
                 over = _over_length(offset)
-                yield offset * over, move * distance * over
+                turn = move * distance * over
+                # Nearer than that, the light does not grow any more.
+                yield offset * over, np.where((1 - turn) > over * LEAST_DISTANCE, turn, np.inf)
 
 
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:

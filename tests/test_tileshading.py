@@ -19,7 +19,7 @@ from quiltcli.raster.tiles import Tiles
 from quiltcli.raster.vectors import BASIS, BlockVectors, TileVectors, on_grid
 from quiltcli.raster.visibility import SQUARE
 from quiltcli.raster.whole import WholeTiles
-from quiltcli.shading import shade
+from quiltcli.shading import LEAST_DISTANCE, shade
 from quiltcli.tileshading import NodeShader, pixel_colors
 from tests.benchmarks.meshes import room
 from tests.benchmarks.stages import cube, stage_for, viewer_of
@@ -118,11 +118,13 @@ def test_calm_squares_are_nearer_than_half_floats_tell(lamp_is, roughness, metal
     assert checked > COUNT / 5
 
 
-def test_vertex_colours_are_calm_too():
+@pytest.mark.parametrize(
+    "colors", [[[1, 0.2, 0.1], [0.1, 1, 0.4], [0.3, 0.3, 1]], [[0, 0, 0], [0.01, 1, 0], [1, 0, 0.2]]]
+)
+def test_vertex_colours_are_calm_too(colors):
     rng = np.random.default_rng(6)
     lamp = np.array([0.0, 0.6, 0.8])
-    scene = wall(lights([-lamp], [[1, 1, 1]]))
-    scene = replace(scene, colors=np.float32([[1, 0.2, 0.1], [0.1, 1, 0.4], [0.3, 0.3, 1]]))
+    scene = replace(wall(lights([-lamp], [[1, 1, 1]])), colors=np.float32(colors))
     some = tiles(rng, lamp, bent=False, near_glint=False, colored=True)
     calm, count = calm_ones(scene, some)
     assert count > COUNT / 5
@@ -159,17 +161,36 @@ def test_a_polynomial_of_second_degree_is_its_own(side):
     assert (np.abs(got - at(x, y)) <= 8 * 2.0**-23 * largest).all()
 
 
-@pytest.mark.parametrize("color", [(1e-6, 0.3, 7.0), (60000.0, 65504.0, 1e6)])
+@pytest.mark.parametrize("color", [(1e-6, 0.3, 7.0), (60000.0, 65504.0, 1e6), (1.0, 3e38, np.inf)])
 def test_colours_between_nodes_are_rounded_like_others(color):
     lamp = np.array([0.0, 0.6, 0.8])
     scene = wall(lights([-lamp], [[1, 1, 1]], ambient=color), color=(1, 1, 1))
     some = tiles(np.random.default_rng(10), lamp, bent=True, near_glint=False)
     some = some[NodeShader(scene, EYE).calm(some)]
     seen = some.hits(NodeShader(scene, EYE).colors(some))
-    red, green, blue, _ = CHANNELS["rgba"].values(scene, None, seen)
-    for found, values in zip((red, green, blue), pixel_colors(scene, EYE, seen), strict=True):
+    halves = CHANNELS["rgba"].values(scene, None, seen)[:3]
+    exact = shade(scene, EYE, seen.points)
+    for found, values, each in zip(halves, pixel_colors(scene, EYE, seen), exact, strict=True):
         np.testing.assert_array_equal(found, half_floats(values))
-        assert np.isfinite(found).all()
+        steps = found.view(np.int16).astype(int) - half_floats(each).view(np.int16)
+        assert np.abs(steps).max() <= 1
+
+
+def test_nothing_is_calm_about_where_the_light_of_a_lamp_stops_growing():
+    # The lamp is half a millimetre from the middle of each, or five; all is a millimetre from the eye.
+    rng = np.random.default_rng(11)
+    some = tiles(rng, np.array([0.0, 0.0, 1.0]), bent=False, near_glint=False, placed=True)
+    some = replace(some, inverse=some.inverse * 1024)
+    point = Nodes(1).middle(some.rays.axes) / Nodes(1).middle(some.inverse)
+    normal = some.normal.planes[:, 2]
+    calm = {}
+    for far in (5.0, 0.5):
+        calm[far] = [
+            bool(NodeShader(wall(lights(point=[place], power=[[1, 1, 1]])), EYE).calm(some[k : k + 1])[0])
+            for k, place in enumerate((EYE[:, None] + point + far * LEAST_DISTANCE * normal).T[:100])
+        ]
+    assert sum(calm[5.0]) > 5
+    assert not any(calm[0.5])
 
 
 def test_no_microtile_depends_on_its_company():

@@ -27,7 +27,7 @@ from quiltcli.raster.blocks import (
     ray_matrices,
 )
 from quiltcli.raster.depth import DepthRange, triangles_in_range
-from quiltcli.raster.hits import Hits, Places, Points, Wanted
+from quiltcli.raster.hits import Hits, Places, Wanted
 from quiltcli.raster.keys import serial_bits
 from quiltcli.raster.large import covering_keys, draw_large, large_spans
 from quiltcli.raster.order import BatchOrder
@@ -53,9 +53,7 @@ __all__ = [
     "Drawing",
     "Frame",
     "Hits",
-    "Points",
     "Sight",
-    "TileShader",
     "Wanted",
     "WholeTiles",
     "batches",

@@ -191,14 +191,15 @@ def cut_batches(pair_counts: IntArray, blocks: Blocks, wanted: BoolArray) -> lis
     area = (64 * np.diff(used.take(blocks.tile_start))).tolist()
     counts = pair_counts.tolist()
     batches = []
-    first = pixels = pairs = 0
+    first, begun, pixels, pairs = 0, False, 0, 0
     for block in np.flatnonzero(wanted).tolist():
-        if pixels and (pixels + area[block] > BATCH_PIXELS or pairs + counts[block] > BATCH_PAIRS):
+        if begun and (pixels + area[block] > BATCH_PIXELS or pairs + counts[block] > BATCH_PAIRS):
             batches.append((first, block))
             first, pixels, pairs = block, 0, 0
+        begun = True
         pixels += area[block]
         pairs += counts[block]
-    if pixels:
+    if begun:
         batches.append((first, pair_counts.size))
     return batches
 

@@ -162,4 +162,5 @@ class NodeColors:
     @property
     def most(self) -> float:
         """No pixel has more than this."""
-        return float(self.values.max(initial=0.0)) * self.nodes.most
+        greatest = float(self.values.max(initial=0.0))
+        return greatest if self.values.shape[1] == 1 else greatest * self.nodes.most

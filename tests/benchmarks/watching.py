@@ -29,6 +29,7 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (NodeShader, "calm", "shade"),
     (NodeShader, "colors", "shade"),
     (channels, "pixel_colors", "shade"),
+    (channels, "_halves_between", "shade"),
     (draw, "fill", "store"),
     (draw, "clear", "clear"),
     (draw, "clear_blocks", "clear"),
