@@ -143,8 +143,10 @@ class Hits:
         if values.size == 1:
             values = np.broadcast_to(values, (len(self.depth), 1))
         index = self.chosen
+        if values.shape[1] < k and index is None:
+            return np.broadcast_to(values, (len(values), k)).reshape(-1)
         if values.shape[1] < k:
-            index = np.arange(values.size * k) // k if index is None else index // k
+            index = index // k
         flat = values.reshape(-1)
         return flat if index is None else np.asarray(flat.take(index))
 
