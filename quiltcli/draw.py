@@ -319,20 +319,18 @@ def draw_batch(
     wanted = wanted_for(channels, stage.scene)
     if frame.order is not None:
         wanted = replace(wanted, position=True)
-    visible = 0
+    visible, first = 0, stage.blocks.tiles(batch).start
     drawing = draw(frame, batch)
     if stale.any():
-        empty_missed(stage, drawing, np.flatnonzero(stale) + stage.blocks.tiles(batch).start, buffers)
+        empty_missed(stage, drawing, np.flatnonzero(stale) + first, buffers)
     shader = NodeShader(stage.scene, frame.viewer.eye) if "rgba" in channels else None
     for hits in drawing.hits(wanted, shader):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)
         visible += hits.inside
-    tiles = np.ones_like(stale)
-    if mends_itself(stage):
-        tiles[:] = False
-        tiles[drawing.drawn() - stage.blocks.tiles(batch).start] = True
+    tiles = np.full(stale.size, not mends_itself(stage))
+    tiles[drawing.drawn() - first] = True
     drawing.done()
     return Drawn(visible, tiles)
 

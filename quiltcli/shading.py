@@ -104,7 +104,7 @@ def shading_wants(scene: Scene) -> Wanted:
 def shade(scene: Scene, eye: FloatArray, seen: Points) -> tuple[Float32Array, ...]:
     """Linear red, green and blue of points: (n, k), (n, 1) or (1, k) where others agree, float32.
 
-    What is grey for all points has one array for the three.
+    Of what is grey at all points there is one array, not three.
 
     Args:
         scene: the scene.
@@ -130,8 +130,7 @@ def shade(scene: Scene, eye: FloatArray, seen: Points) -> tuple[Float32Array, ..
         nl = products(points.normal, points.ray)
         nl *= points.ray_scale
         _add_light(total, points, nl, np.reciprocal(points.ray_scale), np.full(3, HEADLIGHT, np.float32))
-    colors = tuple(np.full(seen.triangle.shape, v) if isinstance(v, np.float32) else v for v in total)
-    return colors * (3 // len(colors))
+    return tuple(np.full(seen.triangle.shape, v) if isinstance(v, np.float32) else v for v in total)
 
 
 def shading_normals(hits: Hits) -> Float32Array:

@@ -15,6 +15,7 @@ import numpy as np
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.raster import Hits, WholeTiles
 from quiltcli.raster.nodes import NodeColors
+from quiltcli.raster.vectors import sum_of_products
 from quiltcli.scene import Scene
 from quiltcli.shading import LEAST_DISTANCE, alpha, shade, vertex_colors
 
@@ -30,16 +31,8 @@ _FLOOR = 1 / 64
 
 
 def pixel_colors(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]:
-    """As `shading.shade`, of hits whose colours may be known at nodes; one array where all is grey."""
-    if hits.colors is not None:
-        return tuple(hits.colors.pixels())
-    colors = shade(scene, eye, hits.points)
-    return colors[:1] if _are_one(colors) else colors
-
-
-def _are_one(colors: tuple[Float32Array, ...]) -> bool:
-    """Whether red, green and blue are one array, as `shade` gives what is grey."""
-    return all(color is colors[0] for color in colors)
+    """As `shading.shade`, of hits whose colours may be known at nodes."""
+    return shade(scene, eye, hits.points) if hits.colors is None else tuple(hits.colors.pixels())
 
 
 @dataclass(frozen=True)
@@ -52,9 +45,8 @@ class NodeShader:
     def colors(self, squares: WholeTiles) -> NodeColors:
         """Colours at the nodes of S squares."""
         colors = shade(self.scene, self.eye, squares.at_nodes())
-        known = colors[:1] if _are_one(colors) else colors
-        nodes = np.empty((len(known), max(map(len, known)), squares.triangle.size))
-        for values, color in zip(nodes, known, strict=True):
+        nodes = np.empty((len(colors), max(map(len, colors)), squares.triangle.size))
+        for values, color in zip(nodes, colors, strict=True):
             values[:] = np.minimum(color, _MOST)  # sums with infinity would be no numbers
         return NodeColors(squares.nodes.on_grids(nodes), squares.nodes)
 
@@ -73,7 +65,7 @@ class NodeShader:
         eye_turn = nodes.vectors_reach(rays) * ray_over
         normal_turn = nodes.vectors_reach(squares.normal) * normal_over
         depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse)
-        nv = _dot(normal, eye)
+        nv = sum_of_products(normal, eye)
         result: BoolArray = nv > np.maximum(_CALM * (eye_turn + normal_turn), _FLOOR)
         if len(self.scene.lights.point_position) or len(squares.weights):
             result &= _CALM * depth_turn < 1
@@ -82,8 +74,8 @@ class NodeShader:
             result &= (_VARIED * hues.min(axis=1) >= hues.max(axis=1)).all(axis=0)
         rough = alpha(self.scene, squares.triangle)
         for lamp, lamp_turn in self._lamps(squares, eye, eye_turn, eye_turn + depth_turn):
-            nl = _dot(normal, lamp)
-            half2 = np.maximum(1 + _dot(eye, lamp), 1e-12)  # 2 (v·h)²
+            nl = sum_of_products(normal, lamp)
+            half2 = np.maximum(1 + sum_of_products(eye, lamp), 1e-12)  # 2 (v·h)²
             sine2 = np.maximum(1 - np.maximum(nv + nl, 0) ** 2 / (2 * half2), 0)  # of the angle n, h
             lamp_reach = _CALM * (normal_turn + lamp_turn)
             half_reach = _CALM * (normal_turn + (eye_turn + lamp_turn) / np.sqrt(2 * half2))
@@ -111,7 +103,7 @@ class NodeShader:
             yield eye, eye_turn
         if len(lights.point_position):
             point = squares.nodes.middle(squares.rays.axes) / squares.nodes.middle(squares.inverse)
-            distance = np.sqrt(_dot(point, point))
+            distance = np.sqrt(sum_of_products(point, point))
             for place in lights.point_position:
                 offset = (place - self.eye)[:, None] - point
                 over = _over_length(offset)
@@ -120,11 +112,6 @@ class NodeShader:
                 yield offset * over, np.where((1 - turn) > over * LEAST_DISTANCE, turn, np.inf)
 
 
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Products (G,) of vectors (3, G), summed in the order x, y, z."""
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
 def _over_length(vectors: FloatArray) -> FloatArray:
     """One over the lengths (G,) of vectors (3, G)."""
-    return np.asarray(1 / np.sqrt(_dot(vectors, vectors) + 1e-300))
+    return np.asarray(1 / np.sqrt(sum_of_products(vectors, vectors) + 1e-300))

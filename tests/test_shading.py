@@ -15,7 +15,8 @@ from quiltcli.scene import Materials
 
 
 def shade(scene, eye, seen):
-    return np.stack([color.ravel() for color in shading.shade(scene, eye, on(scene, seen).points)])
+    colors = shading.shade(scene, eye, on(scene, seen).points)
+    return np.stack([color.ravel() for color in colors * (3 // len(colors))])
 
 
 def shading_normals(scene, seen):

@@ -69,7 +69,6 @@ def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False, side=1):
             vectors,
             on_grid(vectors.along(np.array([0, 0, 1.0]))),
             on_grid(vectors.planes) if placed else np.zeros((0, 3, square.size)),
-            radial=False,
             placed=placed,
         ),
         inverse=on_grid(spread_out(inverse)),
@@ -84,7 +83,7 @@ def relative_errors(scene, some):
     """How far microtiles (n, 64) shaded at nodes are from pixel by pixel, over the value, of all colours."""
     exact = shade(scene, EYE, some.hits(None).points)
     found = pixel_colors(scene, EYE, some.hits(NodeShader(scene, EYE).colors(some.squares)))
-    pairs = zip(found * (3 // len(found)), exact, strict=True)
+    pairs = zip(found, exact, strict=True)
     return np.stack([np.abs(f.astype(float) - e) / np.maximum(e, 1e-4) for f, e in pairs])
 
 

@@ -128,8 +128,7 @@ class Drawing:
 
     def drawn(self) -> IntArray:
         """The microtiles of which pixels see something."""
-        canvas = self.canvas
-        return canvas.number[(canvas.touched | (canvas.filler > 0)) & canvas.used]
+        return self.canvas.number[self.canvas.drawn()]
 
     def done(self) -> None:
         """Leave the drawing's memory to the next; nothing may be read from it any more."""

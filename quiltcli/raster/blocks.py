@@ -235,6 +235,10 @@ class Canvas:
     full: BoolArray
     filler: IntArray
 
+    def drawn(self) -> IntArray:
+        """The microtiles, by their place in the canvas, of which pixels see something."""
+        return np.flatnonzero((self.touched | (self.filler > 0)) & self.used)
+
 
 def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
     """An empty canvas for the blocks with these indices."""

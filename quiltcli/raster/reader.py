@@ -33,27 +33,25 @@ class TileRays:
 
     Attributes:
         vectors: d, of any length, from the eye.
-        along: (3, n) planes, on grids (`vectors.grid_values`), of the depth of d where it is planar.
+        along: (3, n) planes, on grids (`vectors.grid_values`), of the depth of d; None where it is radial.
         axes: (3, 3, n) planes, on grids, of d by axis; none where neither depth nor position needs them.
-        radial: whether depth is the length of d.
         placed: whether positions are wanted.
     """
 
     vectors: BlockVectors
-    along: FloatArray
+    along: FloatArray | None
     axes: FloatArray
-    radial: bool
     placed: bool
 
     def __getitem__(self, part: slice | IntArray) -> TileRays:
         """Those of some microtiles."""
-        along, axes = self.along[:, part], self.axes[:, :, part]
-        return TileRays(self.vectors[part], along, axes, self.radial, self.placed)
+        along = None if self.along is None else self.along[:, part]
+        return TileRays(self.vectors[part], along, self.axes[:, :, part], self.placed)
 
     def values(self) -> tuple[FloatArray, FloatArray | None]:
         """The depth (n, 64) of the points d, and if wanted these points (3, n, 64), the eye at the origin."""
         points = [grid_values(plane) for plane in self.axes]
-        if self.radial:
+        if self.along is None:
             x, y, z = points
             depth = np.sqrt(x * x + y * y + z * z)
         else:
@@ -69,8 +67,7 @@ def rays_through(reader: Reader, tiles: Tiles) -> TileRays:
     none = np.zeros((0, 3, tiles.x.size))
     return TileRays(
         vectors=vectors,
-        along=on_grid(vectors.along(limits.look)),
+        along=None if limits.radial else on_grid(vectors.along(limits.look)),
         axes=on_grid(vectors.planes) if limits.radial or placed else none,
-        radial=limits.radial,
         placed=placed,
     )

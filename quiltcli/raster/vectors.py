@@ -75,14 +75,14 @@ class BlockVectors:
 
     def along(self, direction: Float32Array | FloatArray) -> FloatArray:
         """Planes (3, G) of the products with one direction (3,)."""
-        return moved(_sum_of_products(self.matrix, direction).take(self.block, axis=1), self.x, self.y)
+        return moved(sum_of_products(self.matrix, direction).take(self.block, axis=1), self.x, self.y)
 
     def onto(self, vectors: Float32Array) -> FloatArray:
         """Planes (3, G) of the products with vectors, (3, G, 1) one a microtile or (3, 1, 1) one for all."""
         if vectors.shape[1] == 1:
             return self.along(vectors[:, 0, 0])
         part = np.take(self.matrix, self.block, axis=2)
-        return moved(_sum_of_products(part, vectors[:, None, :, 0]), self.x, self.y)
+        return moved(sum_of_products(part, vectors[:, None, :, 0]), self.x, self.y)
 
     @cached_property
     def squares(self) -> FloatArray:
@@ -108,10 +108,10 @@ def vector_values(vectors: Vectors) -> Float32Array:
 def along(vectors: Vectors, direction: Float32Array) -> Float32Array:
     """Products (G, k) or (G, 1) with one direction (3,)."""
     if isinstance(vectors, PointVectors):
-        return _sum_of_products(vectors.values, direction)
+        return sum_of_products(vectors.values, direction)
     if isinstance(vectors, BlockVectors):
         return single_values(vectors.along(direction))
-    return single_values(_sum_of_products(vectors.planes, direction))
+    return single_values(sum_of_products(vectors.planes, direction))
 
 
 def products(a: Vectors, b: Vectors) -> Float32Array:
@@ -122,7 +122,7 @@ def products(a: Vectors, b: Vectors) -> Float32Array:
         return single_values(b.onto(a.values))
     if not isinstance(a, PointVectors) and not isinstance(b, PointVectors):
         return single_values(_quadratic(a.planes, b.planes))
-    return _sum_of_products(vector_values(a), vector_values(b))
+    return sum_of_products(vector_values(a), vector_values(b))
 
 
 def _quadratic(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -167,7 +167,7 @@ def single_values(form: FloatArray) -> Float32Array:
     return exact_values(form).astype(np.float32)
 
 
-def _sum_of_products(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+def sum_of_products(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
     """Products summed along the first axis, in the order x, y, z."""
     result: NDArray[Any] = a[0] * b[0]
     part = a[1] * b[1]

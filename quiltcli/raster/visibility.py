@@ -48,7 +48,7 @@ def read_canvas(
         wanted: what the hits shall tell.
         shader: shades whole microtiles by their nodes, where it is given.
     """
-    tiles = tiles_at(canvas, blocks, np.flatnonzero((canvas.touched | (canvas.filler > 0)) & canvas.used))
+    tiles = tiles_at(canvas, blocks, canvas.drawn())
     if not tiles.index.size:
         return
     reader = Reader(canvas, table, blocks, limits, bits, wanted)
@@ -103,14 +103,12 @@ def _squares(canvas: Canvas, tiles: Tiles, serial: IntArray, whole: IntArray) ->
     first = (serial >= 0) & ((column | row) & (SQUARE - 1) == 0)
     first &= (column + SQUARE <= across) & (row + SQUARE <= down)
     first = np.flatnonzero(first)
-    same = np.ones(first.size, dtype=np.bool_)
-    corner, step, pair = index[first], across[first], serial[first]
-    for y in range(SQUARE):
-        for x in range(SQUARE):
-            same &= filled.take(corner + y * step + x, mode="clip") == pair
-    corner, step = corner[same, None, None], step[same, None, None]
-    cells = corner + np.arange(SQUARE)[:, None] * step + np.arange(SQUARE)
-    return place.take(cells.reshape(-1))
+    offsets = np.arange(SQUARE)
+    cells = index[first, None, None] + across[first, None, None] * offsets[:, None] + offsets
+    cells = cells.reshape(-1, SQUARE**2)
+    same = (filled.take(cells) == serial[first, None]).all(axis=1)
+    found: IntArray = place.take(cells[same].reshape(-1))
+    return found
 
 
 def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:

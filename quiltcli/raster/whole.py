@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -65,10 +66,14 @@ class WholeTiles:
         """The nodes of the squares."""
         return nodes_of(self.side)
 
-    @property
+    @cached_property
     def squares(self) -> WholeTiles:
         """The first microtile of every square: its planes are those of the square."""
         return self[:: self.side**2]
+
+    def of(self, squares: BoolArray) -> WholeTiles:
+        """The microtiles of some squares (S,)."""
+        return self if squares.all() else self[np.flatnonzero(squares.repeat(self.side**2))]
 
     def at_nodes(self) -> Points:
         """What is seen at the nodes of `squares`."""
@@ -168,21 +173,16 @@ def tile_hits(tiles: WholeTiles, shader: TileShader | None) -> Iterator[Hits]:
 
     Squares for which it is not are shaded by their microtiles.
     """
-    squares = tiles.squares
-    count = tiles.side**2
-    calm = np.zeros(squares.triangle.size, dtype=np.bool_) if shader is None else shader.calm(squares)
-    if shader is not None and calm.any():
-        some = np.flatnonzero(calm)
-        chosen = tiles if some.size == calm.size else tiles[_members(some, count)]
-        yield from _in_parts(chosen, shader.colors(squares if some.size == calm.size else squares[some]))
+    if shader is None:
+        yield from _in_parts(tiles, None)
+        return
+    calm = shader.calm(tiles.squares)
+    if calm.any():
+        some = tiles.of(calm)
+        yield from _in_parts(some, shader.colors(some.squares))
     if not calm.all():
-        rest = replace(tiles[_members(np.flatnonzero(~calm), count)], side=1)
+        rest = replace(tiles.of(~calm), side=1)
         yield from _in_parts(rest, None) if tiles.side == 1 else tile_hits(rest, shader)
-
-
-def _members(squares: IntArray, count: int) -> IntArray:
-    """The microtiles of squares (S,) of so many."""
-    return (squares[:, None] * count + np.arange(count)).reshape(-1)
 
 
 def _in_parts(tiles: WholeTiles, colors: NodeColors | None) -> Iterator[Hits]:

@@ -104,19 +104,19 @@ class Scene:
         All triangles at a vertex p face away from an eye e where axis·(e − p) ≤ −sine·|e − p|. The sine is
         1 where they face every way.
         """
-        normal = self.planes[:3] / np.maximum(np.sqrt(dot(self.planes[:3].T, self.planes[:3].T)), 1e-300)
+        normal = normalized(self.planes[:3].T)
         count = len(self.vertices)
         axis = np.zeros((3, count))
         for k in range(3):
-            for sums, values in zip(axis, normal, strict=True):
+            for sums, values in zip(axis, normal.T, strict=True):
                 sums += np.bincount(self.triangles[:, k], weights=values, minlength=count)
-        axis /= np.maximum(np.sqrt(dot(axis.T, axis.T)), 1e-300)
+        axis = normalized(axis.T)
         least = np.ones(count)
         for k in range(3):
             corner = self.triangles[:, k]
-            np.minimum.at(least, corner, dot(axis.T.take(corner, axis=0), normal.T))
+            np.minimum.at(least, corner, dot(axis.take(corner, axis=0), normal))
         sine = np.where(least > 0, np.sqrt(np.maximum(1 - least * least, 0)), 1.0)
-        return np.concatenate((axis, sine[None]))
+        return np.concatenate((axis.T, sine[None]))
 
     @cached_property
     def corner_normals(self) -> Float32Array:
