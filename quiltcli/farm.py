@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from quiltcli import __version__
-from quiltcli.draw import Stage, default_threads, set_stage
+from quiltcli.draw import default_threads
 from quiltcli.errors import CheckFailedError, JobError, MissingExtraError, Problem, QuiltError, raise_all
 from quiltcli.interrupt import Stopped, stop_between_frames
 from quiltcli.job import JobFile, job_sha256, load_job
@@ -33,6 +33,7 @@ from quiltcli.render import (
     viewer_path,
 )
 from quiltcli.report import FrameRecord, write_report
+from quiltcli.stage import Stage, set_stage
 
 _RETRIES = 2
 _SECONDS_TO_CONNECT = 10

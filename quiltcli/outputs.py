@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from quiltcli import __version__
+from quiltcli.blank import Buffers
 from quiltcli.display import lit_facets
-from quiltcli.draw import Buffers, Clock, Stage
+from quiltcli.draw import Clock
 from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.exr import (
     Channel,
@@ -29,6 +30,7 @@ from quiltcli.exrwindow import cropped, frame_size, tight_window, whole_frame
 from quiltcli.geometry import IntArray, facet_from_world
 from quiltcli.job import dump_job
 from quiltcli.layout import Layout, write_layout
+from quiltcli.stage import Stage
 from quiltcli.unmap import facet_image, page_of
 from quiltcli.viewer import Viewer, viewer_at
 from quiltcli.wholefile import link_whole, make_folder, remove_file, write_text

@@ -26,13 +26,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.batch import Drawn, draw_batch
 from quiltcli.binframe import Binned, BinPlan, Seen, Share, bin_frame, bin_share, join, see_vertices, sight_of
+from quiltcli.blank import Buffers, clear_blocks
 from quiltcli.channels import exr_channels
-from quiltcli.draw import Buffers, Drawn, Stage, Threads, clear_blocks, draw_batch, plan_of
+from quiltcli.draw import Threads, plan_of
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
 from quiltcli.homography import QuiltRays, quilt_rays
 from quiltcli.raster import BlockPairs, Frame, pairs_by_block
+from quiltcli.stage import Stage
 from quiltcli.viewer import Viewer
 
 _ROOM = 8  # pairs a triangle there is room for; memory that is not touched costs nothing
@@ -59,7 +62,7 @@ def shared_array(length: int, dtype: Any) -> NDArray[Any]:
 
 
 def shared_buffers(stage: Stage) -> Buffers:
-    """As `draw.new_buffers`, in memory that workers share."""
+    """As `blank.new_buffers`, in memory that workers share."""
     buffers = {}
     for name, (dtype, empty) in exr_channels(stage.job.output.channels).items():
         buffers[name] = shared_array(stage.owners.size, dtype)
@@ -233,7 +236,7 @@ class Pool:
     def draw(
         self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
     ) -> list[Drawn]:
-        """Draw batches into one of the pool's buffers, as `draw.draw_batch`."""
+        """Draw batches into one of the pool's buffers, as `batch.draw_batch`."""
         pairs = frame.pairs
         if pairs.memory is not self._arena.pairs.memory:
             return Threads(self._stage, len(self._workers)).draw(frame, work, buffers, stale)

@@ -20,8 +20,9 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli import __version__
+from quiltcli.blank import Buffers, new_buffers
 from quiltcli.display import pitch_mm
-from quiltcli.draw import Buffers, Stage, default_threads, new_buffers, set_stage
+from quiltcli.draw import default_threads
 from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, raise_all
 from quiltcli.exr import use_threads
 from quiltcli.eyes import eye_problems
@@ -41,6 +42,7 @@ from quiltcli.outputs import (
 )
 from quiltcli.pool import Pool, can_fork, shared_buffers, worth_forking
 from quiltcli.report import FrameRecord, write_report
+from quiltcli.stage import Stage, set_stage
 from quiltcli.viewer import Viewer, check_viewer, viewer_at
 
 

@@ -7,11 +7,11 @@ from rig import icosphere
 from wallscene import lights, wall
 
 from quiltcli.display import Facets
-from quiltcli.draw import Stage, stage_of
 from quiltcli.job import JobFile
 from quiltcli.layout import align
 from quiltcli.packing import pack
 from quiltcli.scene import Lights, Scene
+from quiltcli.stage import Stage, stage_of
 
 
 def ball_scene(splits: int, radius: float = 0.8, lamps: Lights | None = None, background=(0, 0, 0)) -> Scene:

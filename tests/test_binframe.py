@@ -12,8 +12,9 @@ from rig import cube, display, viewer
 from wallscene import lights, wall
 
 from quiltcli.binframe import bin_frame, bin_share, faces_eye, join, may_face, see_vertices, sight_of, unseen
+from quiltcli.blank import new_buffers
 from quiltcli.display import lit_facets
-from quiltcli.draw import draw_frame, new_buffers, plan_of
+from quiltcli.draw import draw_frame, plan_of
 from quiltcli.homography import quilt_rays
 from quiltcli.raster import pairs_by_block
 from quiltcli.raster.prewarp import triangles_of

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from quiltcli.draw import draw_frame, new_buffers, set_stage
+from quiltcli.blank import new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.job import load_job
 from quiltcli.preview import tone_map
+from quiltcli.stage import set_stage
 from quiltcli.unmap import page_of
 from quiltcli.viewer import viewer_at
 

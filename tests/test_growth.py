@@ -13,10 +13,12 @@ from ballstage import ball_scene, stage_of_facets
 from benchmarks.watching import STAGES, counted, stage_seconds
 from rig import display, icosphere, viewer
 
-from quiltcli import binframe, binning, draw, raster
+from quiltcli import batch, binframe, binning, blank, raster
+from quiltcli.blank import new_buffers
 from quiltcli.display import Facets
-from quiltcli.draw import Stage, draw_frame, new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.scene import Scene
+from quiltcli.stage import Stage
 
 EYE = viewer((2.2, 1.8, 3.2))
 PIXELS = 400_000  # of all facets together, lit or not
@@ -26,8 +28,8 @@ PROBES = {
     (binframe, "bin_share"): lambda share, *_: {"pairs": share.pairs, "block pairs": share.keys.size},
     (raster, "draw_small"): lambda candidates, *_: {"small": candidates},
     (raster, "draw_large"): lambda evaluated, *_: {"large": evaluated},
-    (draw, "block_window"): lambda pixels, buffer, *_: {"bytes": pixels.size * buffer.itemsize},
-    (draw, "fill"): lambda _, buffers, channels, scene, eye, hits: {
+    (blank, "block_window"): lambda pixels, buffer, *_: {"bytes": pixels.size * buffer.itemsize},
+    (batch, "fill"): lambda _, buffers, channels, scene, eye, hits: {
         "shaded": hits.depth.size,
         "hits": hits.pixel.size,
         "bytes": hits.pixel.size * sum(buffer.itemsize for buffer in buffers.values()),
@@ -166,7 +168,7 @@ def test_only_what_was_drawn_is_emptied_where_something_is_drawn_again():
     buffers, dirty = new_buffers(stage), np.zeros(stage.blocks.used.size, bool)
     draw_frame(stage, EYE, buffers, dirty=dirty)
     asked = []
-    probe = {(draw, "empty_missed"): lambda _, stage, drawing, tiles, buffers: asked.append(tiles) or {}}
+    probe = {(batch, "empty_missed"): lambda _, stage, drawing, tiles, buffers: asked.append(tiles) or {}}
     with counted(probe):
         draw_frame(stage, EYE, buffers, dirty=dirty)
     np.testing.assert_array_equal(np.concatenate(asked), np.flatnonzero(dirty))

@@ -10,10 +10,10 @@ import pytest
 import rig
 from tinyjob import write_tiny_job
 
+from quiltcli.blank import new_buffers
 from quiltcli.camera import viewer_frustum
 from quiltcli.display import lit_facets
 from quiltcli.draw import draw_frame as rasterize_frame
-from quiltcli.draw import new_buffers, set_stage
 from quiltcli.errors import JobError
 from quiltcli.geometry import cross, dot
 from quiltcli.homography import plane_homography, quilt_rays
@@ -33,6 +33,7 @@ from quiltcli.orders import (
 from quiltcli.packing import pack
 from quiltcli.raster import batches, rasterize
 from quiltcli.render import RenderOptions, render
+from quiltcli.stage import set_stage
 from quiltcli.viewer import viewer_at
 
 SCENES = Path(__file__).parents[1] / "scenes"

@@ -26,7 +26,7 @@ ORDER = (
         "progress",
         "diff",
     ),
-    *("binframe", "draw", "methods", "pool", "outputs", "interrupt", "render"),
+    *("binframe", "stage", "blank", "batch", "draw", "methods", "pool", "outputs", "interrupt", "render"),
     *("verify", "preview", "contact", "video"),
     *("simulate", "view", "compare", "sweetspot", "info", "checking", "farm", "cli", "__main__"),
 )

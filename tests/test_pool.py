@@ -13,7 +13,8 @@ from rig import cube, display, icosphere, viewer
 from wallscene import lights
 
 from quiltcli import pool as pools
-from quiltcli.draw import draw_frame, new_buffers
+from quiltcli.blank import new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.errors import CheckFailedError
 from quiltcli.pool import Pool, can_fork, shared_buffers
 

@@ -12,9 +12,10 @@ from skyscene import sky_job
 from tinyjob import write_tiny_job
 from turnedlayout import turned_display, turned_layout
 
+from quiltcli.blank import new_buffers
 from quiltcli.camera import camera_display, raster_display
 from quiltcli.cli import main
-from quiltcli.draw import draw_frame, new_buffers, set_stage
+from quiltcli.draw import draw_frame
 from quiltcli.geometry import dot
 from quiltcli.job import load_job
 from quiltcli.layout import quilt_polygons
@@ -31,6 +32,7 @@ from quiltcli.simulate.picture import (
     with_channels,
 )
 from quiltcli.simulate.reference import facet_windows, resampled_light
+from quiltcli.stage import set_stage
 from quiltcli.viewer import viewer_at
 
 MODELS = Path(__file__).parent.parent / "display_models"

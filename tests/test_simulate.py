@@ -12,7 +12,6 @@ from PIL import Image
 
 from quiltcli.camera import camera_display
 from quiltcli.cli import main
-from quiltcli.draw import set_stage
 from quiltcli.job import load_job
 from quiltcli.layout import pixel_owners
 from quiltcli.render import render
@@ -21,6 +20,7 @@ from quiltcli.simulate.compare import compare, figures, flip_map, heat_map, heat
 from quiltcli.simulate.images import shown_images
 from quiltcli.simulate.lookup import Shown, look_up, nearest_pixels, quilt_places
 from quiltcli.simulate.picture import displayed_light, picture_rays, visible_facets, with_channels
+from quiltcli.stage import set_stage
 from quiltcli.viewer import viewer_at
 
 MODELS = Path(__file__).parent.parent / "display_models"

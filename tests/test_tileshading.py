@@ -9,8 +9,9 @@ import pytest
 from rig import CUBE, CUBE_FACES, display
 from wallscene import lights, wall
 
+from quiltcli.blank import new_buffers
 from quiltcli.channels import CHANNELS, half_floats
-from quiltcli.draw import draw_frame, new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.geometry import normalized
 from quiltcli.raster.nodes import Nodes
 from quiltcli.raster.planes import moved

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from rig import CUBE, CUBE_FACES, icosphere
 
-from quiltcli.draw import Stage, set_stage
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.job import JobFile, load_job
 from quiltcli.render import viewer_path
+from quiltcli.stage import Stage, set_stage
 from quiltcli.verify import Verdict, VerifyOptions, verify_images
 from quiltcli.verify.frame import make_trial
 from quiltcli.verify.images import Images, draw_images

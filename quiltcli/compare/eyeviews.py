@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from quiltcli.blank import Buffers
 from quiltcli.camera import aimed, camera_display, frame_display
-from quiltcli.draw import Buffers, Stage
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.preview import Bytes, block_means, tone_map
 from quiltcli.simulate.compare import Comparison, seam_pixels
 from quiltcli.simulate.compare import compare as compare_pictures
 from quiltcli.simulate.lookup import Shown, nearest_pixels, quilt_places
 from quiltcli.simulate.picture import Camera, direct_light, displayed_light, picture_rays, visible_facets
+from quiltcli.stage import Stage
 from quiltcli.viewer import Viewer
 
 SIZE = (720, 540)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.draw import Buffers, Stage
+from quiltcli.blank import Buffers
 from quiltcli.errors import JobError
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
 from quiltcli.homography import QuiltRays
@@ -18,6 +18,7 @@ from quiltcli.methods.raycast import RESOLUTION
 from quiltcli.rays.embree import Target, plane_depth
 from quiltcli.rays.place import places
 from quiltcli.simulate.compare import Comparison
+from quiltcli.stage import Stage
 from quiltcli.verify.seams import Seams
 
 _CHUNK = 1 << 18

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from quiltcli.blank import Buffers
 from quiltcli.display import SharedEdges, shared_edges
-from quiltcli.draw import Buffers, Stage
 from quiltcli.geometry import FloatArray, IntArray, cross, dot, normalized
 from quiltcli.homography import QuiltRays
+from quiltcli.stage import Stage
 
 SAMPLES = 96
 _PLACES = (0.5, 0.35, 0.65, 0.2, 0.8)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from quiltcli.blank import Buffers, new_buffers
 from quiltcli.compare.eyeviews import (
     EyeView,
     close_view,
@@ -28,7 +29,7 @@ from quiltcli.compare.findings import (
 )
 from quiltcli.compare.profile import Profile, best_profile
 from quiltcli.display import shared_edges
-from quiltcli.draw import Buffers, Stage, default_threads, new_buffers, set_stage
+from quiltcli.draw import default_threads
 from quiltcli.errors import JobError, ViewerError, raise_all
 from quiltcli.eyes import eye_problems
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
@@ -36,6 +37,7 @@ from quiltcli.job import JobFile
 from quiltcli.methods import draw_frame
 from quiltcli.preview import Bytes
 from quiltcli.render import viewer_path
+from quiltcli.stage import Stage, set_stage
 from quiltcli.verify.frame import make_trial
 from quiltcli.verify.images import Images
 from quiltcli.verify.pixels import Trial

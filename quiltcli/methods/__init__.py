@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from quiltcli.draw import Buffers, Crew, Stage
+from quiltcli.blank import Buffers
+from quiltcli.draw import Crew
 from quiltcli.draw import draw_frame as rasterize_frame
 from quiltcli.geometry import BoolArray
 from quiltcli.methods.raycast import cast_frame
 from quiltcli.methods.twopass import draw_twice
 from quiltcli.report import FrameRecord
+from quiltcli.stage import Stage
 from quiltcli.viewer import Viewer
 
 __all__ = ["OTHERS", "draw_frame"]

@@ -15,9 +15,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from quiltcli.blank import Buffers, clear, lay_background
 from quiltcli.channels import fill
 from quiltcli.display import lit_facets
-from quiltcli.draw import Buffers, Stage, clear, lay_background
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
 from quiltcli.homography import quilt_rays
 from quiltcli.raster import Hits
@@ -27,6 +27,7 @@ from quiltcli.rays.embree import Target, aim, cast, plane_depth, plane_distance
 from quiltcli.rays.exact import Neighbours, intersect
 from quiltcli.rays.place import OFFSETS, Places, places
 from quiltcli.report import FrameRecord
+from quiltcli.stage import Stage
 from quiltcli.viewer import Viewer
 
 _CHUNK = 1 << 15

@@ -15,15 +15,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.blank import Buffers, clear, new_buffers
 from quiltcli.camera import camera_display, viewer_frustum
 from quiltcli.channels import CHANNELS
 from quiltcli.display import lit_facets
-from quiltcli.draw import Buffers, Stage, clear, draw_frame, new_buffers, stage_of
+from quiltcli.draw import draw_frame
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.homography import quilt_rays
 from quiltcli.methods.raycast import pixels_of
 from quiltcli.rays.place import places
 from quiltcli.report import FrameRecord
+from quiltcli.stage import Stage, stage_of
 from quiltcli.viewer import Viewer
 
 _AROUND = ((0, 0), (1, 0), (0, 1), (1, 1))

@@ -14,7 +14,7 @@ import numpy as np
 
 from quiltcli.camera import aimed, camera_display, frame_display
 from quiltcli.display import Facets
-from quiltcli.draw import Stage, default_threads, set_stage
+from quiltcli.draw import default_threads
 from quiltcli.errors import ViewerError, raise_all
 from quiltcli.geometry import Float32Array
 from quiltcli.job import JobFile, job_sha256
@@ -25,6 +25,7 @@ from quiltcli.simulate.lookup import Shown
 from quiltcli.simulate.picture import direct_light, displayed_light, outlined, visible_facets, with_channels
 from quiltcli.simulate.reference import resampled_light
 from quiltcli.simulate.thirdperson import third_person_camera, third_person_light
+from quiltcli.stage import Stage, set_stage
 from quiltcli.viewer import Viewer, check_viewer, viewer_at
 
 __all__ = [

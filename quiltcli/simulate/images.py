@@ -6,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
+from quiltcli.blank import Buffers, new_buffers
 from quiltcli.display import lit_facets
-from quiltcli.draw import Buffers, Stage, new_buffers
 from quiltcli.exr import facet_path, is_complete, quilt_path, read_exr
 from quiltcli.exrwindow import whole_frame
 from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.layout import pixel_owners
 from quiltcli.methods import draw_frame
 from quiltcli.simulate.lookup import Shown
+from quiltcli.stage import Stage
 from quiltcli.unmap import page_of, quilt_buffers
 from quiltcli.viewer import Viewer
 

@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
+from quiltcli.blank import Buffers
 from quiltcli.display import Facets, shared_edges
-from quiltcli.draw import Buffers
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, OwnerArray, segments
 from quiltcli.homography import QuiltRays, quilt_rays
 from quiltcli.layout import Layout

@@ -7,14 +7,16 @@ from typing import TypeAlias
 
 import numpy as np
 
+from quiltcli.blank import new_buffers
 from quiltcli.display import Facets, lit_facets, triangulate
-from quiltcli.draw import Stage, draw_frame, new_buffers, stage_of
+from quiltcli.draw import draw_frame
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, dot, normalized
 from quiltcli.homography import eye_from_quilt
 from quiltcli.job import JobFile
 from quiltcli.layout import Layout
 from quiltcli.scene import Lights, Materials, Scene
 from quiltcli.simulate.lookup import Shown, look_up, quilt_places
+from quiltcli.stage import Stage, stage_of
 from quiltcli.viewer import Viewer
 
 Camera: TypeAlias = tuple[Facets, Layout]

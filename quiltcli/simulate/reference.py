@@ -13,14 +13,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from quiltcli.blank import new_buffers
 from quiltcli.camera import raster_display
 from quiltcli.display import Facets, lit_facets
-from quiltcli.draw import Stage, draw_frame, new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray, dot
 from quiltcli.homography import eye_from_quilt
 from quiltcli.layout import Layout
 from quiltcli.simulate.lookup import Shown, look_up, quilt_places
 from quiltcli.simulate.picture import Camera, camera_stage, exact, picture_rays
+from quiltcli.stage import Stage
 from quiltcli.viewer import Viewer
 
 _MARGIN = 2  # pixels around the places that are looked up: one is needed

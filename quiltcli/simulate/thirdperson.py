@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from quiltcli.blank import new_buffers
 from quiltcli.camera import aimed, frame_display
 from quiltcli.display import Facets, lit_facets, triangulate
-from quiltcli.draw import Stage, draw_frame, new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.geometry import (
     BoolArray,
     Float32Array,
@@ -35,6 +36,7 @@ from quiltcli.simulate.picture import (
     picture_rays,
     with_channels,
 )
+from quiltcli.stage import Stage
 from quiltcli.viewer import Viewer
 
 SCENES = ("ghost", "solid", "none")

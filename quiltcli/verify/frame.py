@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from quiltcli.display import lit_facets, shared_edges
-from quiltcli.draw import Stage, default_threads, set_stage
+from quiltcli.draw import default_threads
 from quiltcli.errors import ViewerError, raise_all
 from quiltcli.eyes import eye_problems
 from quiltcli.geometry import BoolArray, IntArray
@@ -22,6 +22,7 @@ from quiltcli.job import JobFile
 from quiltcli.rays.embree import aim
 from quiltcli.rays.exact import Neighbours
 from quiltcli.render import viewer_path
+from quiltcli.stage import Stage, set_stage
 from quiltcli.verify.images import Images, find_images
 from quiltcli.verify.pixels import Trial, check_pixels
 from quiltcli.verify.sample import every_pixel, sampled_pixels

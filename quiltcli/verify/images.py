@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from quiltcli.blank import Buffers
 from quiltcli.channels import empty_buffers
-from quiltcli.draw import Buffers, Stage
 from quiltcli.exr import is_complete, quilt_path
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.job import job_sha256
 from quiltcli.methods import draw_frame
 from quiltcli.outputs import outputs, read_quilt
+from quiltcli.stage import Stage
 from quiltcli.viewer import Viewer
 
 _DRAWN = ("Z", "triangle")

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.display import lit_facets
-from quiltcli.draw import Stage, set_stage
 from quiltcli.errors import OutputError, Problem
 from quiltcli.exr import facet_path, is_complete, numbers_in_name, quilt_path, read_header
 from quiltcli.frames import format_frames
 from quiltcli.job import load_job
 from quiltcli.simulate.picture import with_channels
+from quiltcli.stage import Stage, set_stage
 from quiltcli.viewer import viewer_at
 
 

@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from quiltcli.draw import Stage, draw_frame, new_buffers
+from quiltcli.blank import new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.pool import Pool, can_fork, shared_buffers
+from quiltcli.stage import Stage
 from quiltcli.viewer import Viewer
 from tests.benchmarks import meshes, opengl
 from tests.benchmarks.race import Times, race

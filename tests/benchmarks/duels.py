@@ -13,10 +13,12 @@ import numpy as np
 import OpenEXR
 
 from quiltcli import raster
-from quiltcli.draw import Buffers, Stage, draw_frame, new_buffers
+from quiltcli.blank import Buffers, new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.exr import write_exr
 from quiltcli.geometry import BoolArray
 from quiltcli.pool import Pool, can_fork, shared_buffers
+from quiltcli.stage import Stage
 from quiltcli.unmap import page_of
 from quiltcli.viewer import Viewer
 from tests.benchmarks import meshes, opengl

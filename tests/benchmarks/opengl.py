@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from quiltcli.draw import Stage
 from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.raster import Frame
+from quiltcli.stage import Stage
 from tests.benchmarks.stages import facet_pairs
 
 _VERTEX = """#version 330

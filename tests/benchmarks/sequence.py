@@ -13,7 +13,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from quiltcli.draw import draw_frame, new_buffers
+from quiltcli.blank import new_buffers
+from quiltcli.draw import draw_frame
 from quiltcli.job import load_job
 from quiltcli.outputs import write_frame
 from quiltcli.render import Listener, Prepared, RenderOptions, prepare, render_frames

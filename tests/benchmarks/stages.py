@@ -10,7 +10,7 @@ import numpy as np
 
 from quiltcli.binframe import bin_frame
 from quiltcli.display import Facets, lit_facets, load_display
-from quiltcli.draw import Stage, plan_of, stage_of
+from quiltcli.draw import plan_of
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.homography import quilt_rays
 from quiltcli.job import JobFile, ResolutionSpec, load_display_file
@@ -19,6 +19,7 @@ from quiltcli.packing import pack
 from quiltcli.raster import Frame, batches, rasterize
 from quiltcli.scene import Scene
 from quiltcli.shading import shading_wants
+from quiltcli.stage import Stage, stage_of
 from quiltcli.viewer import Viewer
 from tests.benchmarks.meshes import Mesh, scene_of
 from tests.rig import CUBE, CUBE_FACES, display, icosphere, viewer

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from types import GeneratorType
 from typing import Any
 
-from quiltcli import binframe, binning, channels, draw, raster
+from quiltcli import batch, binframe, binning, channels, draw, raster
 from quiltcli.tileshading import NodeShader
 
 STAGES: tuple[tuple[object, str, str], ...] = (
@@ -30,7 +30,7 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (NodeShader, "colors", "shade"),
     (channels, "pixel_colors", "shade"),
     (channels, "_halves_between", "shade"),
-    (draw, "fill", "store"),
+    (batch, "fill", "store"),
     (draw, "clear", "clear"),
     (draw, "clear_blocks", "clear"),
 )
