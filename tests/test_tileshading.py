@@ -14,10 +14,9 @@ from quiltcli.channels import CHANNELS, half_floats
 from quiltcli.draw import draw_frame
 from quiltcli.geometry import normalized
 from quiltcli.raster.nodes import Nodes
-from quiltcli.raster.planes import moved
 from quiltcli.raster.reader import TileRays
 from quiltcli.raster.tiles import Tiles
-from quiltcli.raster.vectors import BASIS, BlockVectors, TileVectors, on_grid
+from quiltcli.raster.vectors import BlockVectors, TileVectors, on_grid
 from quiltcli.raster.visibility import SQUARE
 from quiltcli.raster.whole import WholeTiles
 from quiltcli.shading import LEAST_DISTANCE, shade
@@ -38,7 +37,7 @@ def planes(centre, reach, rng):
 
 
 def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False, side=1):
-    """Squares of microtiles that see anything from anywhere, some of them surfaces near the lamp's image."""
+    """Squares that see anything from anywhere, some of them surfaces near the lamp's image."""
     rays = planes(normalized(rng.normal(size=(COUNT, 3))), 10 ** rng.uniform(-4, -0.5, (COUNT, 1)), rng)
     towards = -(rays[:, 2] + 3.5 * (rays[:, 0] + rays[:, 1])).T
     spread = 10 ** rng.uniform(-4, 0, (COUNT, 1))
@@ -52,47 +51,40 @@ def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False, side=1):
     weights = np.stack((inverse * 0.2, inverse * 0.3, inverse)) if colored else np.zeros((0, 3, COUNT))
     if colored:
         weights[:2, :2] += rng.normal(size=(2, 2, COUNT)) * 0.01
-    # The same over a larger square, and from the first pixels of its microtiles.
-    rays[:, :2] /= side
-    square = np.repeat(np.arange(COUNT), side**2)
-    y, x = (8 * np.tile(place, COUNT) for place in np.divmod(np.arange(side**2), side))
-
-    def spread_out(plane):
-        plane[..., :2, :] /= side
-        return moved(plane[..., square], x, y)
-
-    vectors = BlockVectors(rays, square, x, y)
-    none = np.zeros(square.size, np.int64)
+    for form in (rays, normals, inverse, weights):  # the same over a larger square
+        form[..., :2, :] /= side
+    square = np.arange(COUNT)
+    vectors = BlockVectors(rays, square, np.zeros(COUNT), np.zeros(COUNT), side)
+    none = np.zeros(COUNT, np.int64)
     return WholeTiles(
         tiles=Tiles(*[none] * 9),
-        triangle=np.zeros(square.size, np.int32),
+        triangle=np.zeros(COUNT, np.int32),
         rays=TileRays(
             vectors,
-            on_grid(vectors.along(np.array([0, 0, 1.0]))),
-            on_grid(vectors.planes) if placed else np.zeros((0, 3, square.size)),
+            on_grid(vectors.along(np.array([0, 0, 1.0])), side),
+            on_grid(vectors.planes, side) if placed else np.zeros((0, 3, COUNT)),
             placed=placed,
         ),
-        inverse=on_grid(spread_out(inverse)),
-        normal=TileVectors(spread_out(normals)),
-        weights=on_grid(spread_out(weights)),
+        inverse=on_grid(inverse, side),
+        normal=TileVectors(normals, side),
+        weights=on_grid(weights, side),
         border=None,
         side=side,
     )
 
 
 def relative_errors(scene, some):
-    """How far microtiles (n, 64) shaded at nodes are from pixel by pixel, over the value, of all colours."""
+    """How far squares (n, k) shaded at nodes are from pixel by pixel, over the value, of all colours."""
     exact = shade(scene, EYE, some.hits(None).points)
-    found = pixel_colors(scene, EYE, some.hits(NodeShader(scene, EYE).colors(some.squares)))
+    found = pixel_colors(scene, EYE, some.hits(NodeShader(scene, EYE).colors(some)))
     pairs = zip(found, exact, strict=True)
     return np.stack([np.abs(f.astype(float) - e) / np.maximum(e, 1e-4) for f, e in pairs])
 
 
 def calm_ones(scene, some):
-    """The microtiles of calm squares, and how many squares these are."""
-    calm = np.flatnonzero(NodeShader(scene, EYE).calm(some.squares))
-    count = some.side**2
-    return some[(calm[:, None] * count + np.arange(count)).reshape(-1)], calm.size
+    """The calm squares, and how many these are."""
+    calm = np.flatnonzero(NodeShader(scene, EYE).calm(some))
+    return some[calm], calm.size
 
 
 @pytest.mark.parametrize("lamp_is", ["sun", "eye", "point"])
@@ -145,9 +137,8 @@ def test_a_glint_between_the_nodes_is_not_calm():
 @pytest.mark.parametrize("side", [1, 2, SQUARE])
 def test_a_polynomial_of_second_degree_is_its_own(side):
     nodes = Nodes(side)
-    first = np.arange(side) * 8.0
-    corner = np.stack((np.tile(first, side), np.repeat(first, side)))[:, :, None]
-    x, y = ((corner + BASIS[:2, None]) / (8 * side)).reshape(2, -1)
+    place = np.arange(8 * side) / (8 * side)
+    x, y = np.tile(place, place.size), np.repeat(place, place.size)
     rng = np.random.default_rng(8)
     c = rng.normal(size=(COUNT, 3, 3))
 
@@ -157,7 +148,7 @@ def test_a_polynomial_of_second_degree_is_its_own(side):
     columns, rows = (nodes.at(np.array(plane)[:, None])[:, 0] for plane in ([1.0, 0, 0], [0.0, 1, 0]))
     values = at(columns / (8 * side), rows / (8 * side)).astype(np.float32).T
     largest = np.abs(values).max(axis=0)[:, None]
-    got = nodes.between(nodes.on_grids(values.astype(float))).reshape(COUNT, -1)
+    got = nodes.between(nodes.on_grids(values.astype(float)))
     assert (np.abs(got - at(x, y)) <= 8 * 2.0**-23 * largest).all()
 
 

@@ -38,7 +38,7 @@ class Places:
 
     Attributes:
         first: (R,) quilt addresses of the first pixels of the runs; R·run = P, in their order.
-        run: 1, or RUN.
+        run: 1, or a multiple of RUN.
     """
 
     first: IntArray
@@ -56,19 +56,18 @@ class Places:
             buffer[self.first] = values
             return
         # As elements of `run` pixels: one write for each run.
-        kind = np.dtype((np.void, self.run * buffer.itemsize))
+        size = buffer.itemsize
+        kind = np.dtype((np.void, self.run * size))
         runs = np.repeat(values, self.run) if values.size == 1 else np.ascontiguousarray(values)
-        elements = runs.view(kind)
-        if self._whole_runs is not None:
-            buffer[: buffer.size // RUN * RUN].view(kind)[self._whole_runs] = elements
-            return
         # Elements that begin at every address take three times as long.
-        every = np.ndarray((buffer.size - self.run + 1,), kind, buffer.data, 0, (buffer.itemsize,))
-        every[self.first] = elements
+        step = 1 if self._counted is None else RUN
+        places = ((buffer.size - self.run) // step + 1,)
+        elements = np.ndarray(places, kind, buffer.data, 0, (step * size,))
+        elements[self.first if self._counted is None else self._counted] = runs.view(kind)
 
     @cached_property
-    def _whole_runs(self) -> IntArray | None:
-        """Addresses of the runs counted in runs; None where they do not begin at multiples of them."""
+    def _counted(self) -> IntArray | None:
+        """Addresses of the runs counted in RUNs; None where they do not begin at multiples of them."""
         if np.bitwise_or.reduce(self.first) & (RUN - 1):
             return None
         return self.first >> RUN.bit_length() - 1
@@ -97,8 +96,8 @@ class Points:
 class Hits:
     """What is seen at the pixels of G groups of k; all of a group see one triangle.
 
-    A group is a microtile of 64 pixels that one triangle fills, or a single pixel: what belongs to
-    the triangle is looked up once a group. P of the G·k pixels are to be drawn.
+    A group is a microtile, or a square of them, that one triangle fills, or a single pixel: what belongs
+    to the triangle is looked up once a group. P of the G·k pixels are to be drawn.
 
     Attributes:
         places: where the P pixels that are drawn lie in the quilt.

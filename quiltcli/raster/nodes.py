@@ -49,14 +49,12 @@ class Nodes:
 
     @cached_property
     def _weights(self) -> FloatArray:
-        """What the value at each node counts at each pixel (9, side² · 64), in whole numbers."""
+        """What the value at each node counts at each pixel (9, 64·side²), in whole numbers."""
         low, middle, high = self._places
         x = 2.0 * np.arange(8 * self.side)
-        line = np.stack(
-            ((x - middle) * (x - high), -2 * (x - low) * (x - high), (x - low) * (x - middle))
-        ).reshape(3, self.side, 8)
-        # Node row and column, then microtile row and column, then those of the pixel.
-        square: FloatArray = line[:, None, :, None, :, None] * line[None, :, None, :, None, :]
+        line = np.stack(((x - middle) * (x - high), -2 * (x - low) * (x - high), (x - low) * (x - middle)))
+        # Node row and column, then those of the pixel.
+        square: FloatArray = line[:, None, :, None] * line[None, :, None, :]
         return square.reshape(9, -1)
 
     @cached_property
@@ -118,13 +116,10 @@ class Nodes:
         return values
 
     def between(self, values: FloatArray) -> Float32Array:
-        """Values (S·side², 64) at all pixels, microtile by microtile, from `on_grids` (9, S).
-
-        (S·side², 1) from (1, S).
-        """
+        """Values (S, 64·side²) at all pixels, row by row, from `on_grids` (9, S); (S, 1) from (1, S)."""
         if len(values) == 1:
-            return np.repeat(values[0], self.side**2)[:, None].astype(np.float32)
-        return (values.T @ self._weights).astype(np.float32).reshape(-1, 64)
+            return values.T.astype(np.float32)
+        return (values.T @ self._weights).astype(np.float32)
 
 
 def _slopes(planes: FloatArray) -> FloatArray:
@@ -151,12 +146,11 @@ class NodeColors:
     nodes: Nodes
 
     def __getitem__(self, part: slice) -> NodeColors:
-        """Those of some microtiles, whole squares of them."""
-        count = self.nodes.side**2
-        return NodeColors(self.values[:, :, part.start // count : part.stop // count], self.nodes)
+        """Those of some squares."""
+        return NodeColors(self.values[:, :, part], self.nodes)
 
     def pixels(self, scale: float = 1.0) -> list[Float32Array]:
-        """The colours times `scale` of all pixels, each (microtiles, 64) or (microtiles, 1)."""
+        """The colours times `scale` of all pixels, each (S, 64·side²) or (S, 1)."""
         return [self.nodes.between(values * scale) for values in self.values]
 
     @property

@@ -29,7 +29,7 @@ class Reader:
 
 @dataclass(frozen=True)
 class TileRays:
-    """Rays d through the pixels of n microtiles.
+    """Rays d through the pixels of n squares of microtiles.
 
     Attributes:
         vectors: d, of any length, from the eye.
@@ -44,30 +44,31 @@ class TileRays:
     placed: bool
 
     def __getitem__(self, part: slice | IntArray) -> TileRays:
-        """Those of some microtiles."""
+        """Those of some squares."""
         along = None if self.along is None else self.along[:, part]
         return TileRays(self.vectors[part], along, self.axes[:, :, part], self.placed)
 
     def values(self) -> tuple[FloatArray, FloatArray | None]:
-        """The depth (n, 64) of the points d, and if wanted these points (3, n, 64), the eye at the origin."""
-        points = [grid_values(plane) for plane in self.axes]
+        """The depth (n, k) of the k points d, and if wanted these points (3, n, k), the eye at the origin."""
+        side = self.vectors.side
+        points = [grid_values(plane, side) for plane in self.axes]
         if self.along is None:
             x, y, z = points
             depth = np.sqrt(x * x + y * y + z * z)
         else:
-            depth = grid_values(self.along)
+            depth = grid_values(self.along, side)
         return depth, np.stack(points) if self.placed else None
 
 
-def rays_through(reader: Reader, tiles: Tiles) -> TileRays:
-    """Rays through the pixels of microtiles."""
+def rays_through(reader: Reader, tiles: Tiles, side: int = 1) -> TileRays:
+    """Rays through the pixels of squares of `side` by `side` microtiles, the first of which are `tiles`."""
     limits, placed = reader.limits, reader.wanted.position
     matrix = np.ascontiguousarray(limits.rays.transpose(1, 2, 0))
-    vectors = BlockVectors(matrix, tiles.block, tiles.x, tiles.y)
+    vectors = BlockVectors(matrix, tiles.block, tiles.x, tiles.y, side)
     none = np.zeros((0, 3, tiles.x.size))
     return TileRays(
         vectors=vectors,
-        along=None if limits.radial else on_grid(vectors.along(limits.look)),
-        axes=on_grid(vectors.planes) if limits.radial or placed else none,
+        along=None if limits.radial else on_grid(vectors.along(limits.look), side),
+        axes=on_grid(vectors.planes, side) if limits.radial or placed else none,
         placed=placed,
     )

@@ -44,15 +44,15 @@ class Tiles:
         """Some of the microtiles."""
         return Tiles(*(column[part] for column in vars(self).values()))
 
-    def lines(self) -> IntArray:
-        """Quilt addresses (n, 8) of the first pixels of their rows."""
+    def lines(self, side: int = 1) -> IntArray:
+        """Quilt addresses (n, 8·side) of the first pixels of the rows of squares that begin with them."""
         step = self.stride[:1, None] if (self.stride == self.stride[:1]).all() else self.stride[:, None]
-        result: IntArray = self.address[:, None] + step * np.arange(8)
+        result: IntArray = self.address[:, None] + step * np.arange(8 * side)
         return result
 
-    def places(self) -> Places:
-        """All of their pixels."""
-        return Places(self.lines().reshape(-1), RUN)
+    def places(self, side: int = 1) -> Places:
+        """All pixels of these squares."""
+        return Places(self.lines(side).reshape(-1), RUN * side)
 
 
 def tiles_at(canvas: Canvas, blocks: Blocks, index: IntArray) -> Tiles:
@@ -116,5 +116,5 @@ def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: IntArray) -> Iterator[
 
 def in_parts(rows: IntArray, step: int) -> Iterator[IntArray]:
     """The rows, at most `step` at a time."""
-    for at in range(0, rows.size, step):
+    for at in range(0, len(rows), step):
         yield rows[at : at + step]

@@ -1,13 +1,14 @@
 """Vectors at the pixels of hits, and their products.
 
-Where a triangle fills a microtile, rays and normals are linear over its pixels. Products of them are
-planes or quadratics then: a few numbers a microtile say it all, and no vector is ever written down.
+Where a triangle fills a microtile, or a square of `side` by `side` of them, rays and normals are linear
+over its pixels. Products of them are planes or quadratics then: a few numbers a square say it all, and no
+vector is ever written down.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,14 +17,29 @@ from numpy.typing import NDArray
 from quiltcli.geometry import Float32Array, FloatArray, IntArray
 from quiltcli.raster.planes import moved, power_of_two
 
-BASIS: FloatArray = np.stack((np.tile(np.arange(8.0), 8), np.repeat(np.arange(8.0), 8), np.ones(64)))
-"""Column, row and 1 (3, 64) of the pixels of a microtile, whose 64 pixels are neighbours in memory."""
-
-_QUADRATIC: FloatArray = np.stack((BASIS[0] ** 2, BASIS[0] * BASIS[1], BASIS[1] ** 2, *BASIS))
-_BASIS_OF = {3: BASIS, 6: _QUADRATIC}
-_WEIGHT_OF = {3: np.array([8.0, 8, 1]), 6: np.array([64.0, 64, 64, 8, 8, 1])}
 # Three numbers below 2 rounded to 2⁻⁵⁰, or six to 2⁻⁴⁹, have sums that are exact in double precision.
 _ROUND_TO = {3: 6.0, 6: 12.0}
+
+
+@lru_cache
+def _basis(terms: int, side: int) -> FloatArray:
+    """x, y and 1, or x², xy, y², x, y and 1, (terms, 64·side²) at the pixels of squares, row by row."""
+    place = np.arange(8.0 * side)
+    x, y = np.tile(place, place.size), np.repeat(place, place.size)
+    linear = (x, y, np.ones(x.size))
+    return np.stack(linear if terms == 3 else (x * x, x * y, y * y, *linear))
+
+
+BASIS: FloatArray = _basis(3, 1)
+"""Column, row and 1 (3, 64) of the pixels of a microtile, whose 64 pixels are neighbours in memory."""
+
+
+@lru_cache
+def _reach(terms: int, side: int) -> FloatArray:
+    """What the terms are below (terms, 1): powers of two."""
+    line = 8.0 * side
+    linear = (line, line, 1.0)
+    return np.array(linear if terms == 3 else (line**2, line**2, line**2, *linear))[:, None]
 
 
 @dataclass(frozen=True)
@@ -39,38 +55,41 @@ class PointVectors:
 
 @dataclass(frozen=True)
 class TileVectors:
-    """Vectors that are linear over microtiles: planes (3, 3, G) [axis, coefficient] from the first pixel."""
+    """Vectors that are linear over squares: planes (3, 3, G) [axis, coefficient] from the first pixel."""
 
     planes: FloatArray
+    side: int = 1
 
     def __getitem__(self, part: slice | IntArray) -> TileVectors:
-        """Those of some microtiles."""
-        return TileVectors(self.planes[:, :, part])
+        """Those of some squares."""
+        return TileVectors(self.planes[:, :, part], self.side)
 
 
 @dataclass(frozen=True)
 class BlockVectors:
-    """Vectors that are linear over blocks, as rays are, at the pixels of G microtiles.
+    """Vectors that are linear over blocks, as rays are, at the pixels of G squares.
 
     Attributes:
         matrix: (3, 3, K) planes over blocks [axis, coefficient], from their first pixels.
-        block: (G,) the block of each microtile.
-        x: (G,) first columns of the microtiles in their blocks.
+        block: (G,) the block of each square.
+        x: (G,) first columns of the squares in their blocks.
         y: (G,) first rows.
+        side: how many microtiles are their side.
     """
 
     matrix: FloatArray
     block: IntArray
     x: IntArray
     y: IntArray
+    side: int = 1
 
     def __getitem__(self, part: slice | IntArray) -> BlockVectors:
-        """Those of some microtiles."""
-        return BlockVectors(self.matrix, self.block[part], self.x[part], self.y[part])
+        """Those of some squares."""
+        return BlockVectors(self.matrix, self.block[part], self.x[part], self.y[part], self.side)
 
     @cached_property
     def planes(self) -> FloatArray:
-        """Planes (3, 3, G) from the microtiles' first pixels."""
+        """Planes (3, 3, G) from the squares' first pixels."""
         return moved(np.take(self.matrix, self.block, axis=2), self.x, self.y)
 
     def along(self, direction: Float32Array | FloatArray) -> FloatArray:
@@ -78,14 +97,14 @@ class BlockVectors:
         return moved(sum_of_products(self.matrix, direction).take(self.block, axis=1), self.x, self.y)
 
     def onto(self, vectors: Float32Array) -> FloatArray:
-        """Planes (3, G) of the products with vectors, (3, G, 1) one a microtile or (3, 1, 1) one for all."""
+        """Planes (3, G) of the products with vectors, (3, G, 1) one a square or (3, 1, 1) one for all."""
         if vectors.shape[1] == 1:
             return self.along(vectors[:, 0, 0])
         part = np.take(self.matrix, self.block, axis=2)
         return moved(sum_of_products(part, vectors[:, None, :, 0]), self.x, self.y)
 
     @cached_property
-    def squares(self) -> FloatArray:
+    def lengths2(self) -> FloatArray:
         """Quadratics (6, G) of the vectors' squared lengths."""
         xx, xy, yy, x, y, one = _quadratic(self.matrix, self.matrix).take(self.block, axis=1)
         one += self.x * (xx * self.x + xy * self.y + x) + self.y * (yy * self.y + y)
@@ -101,8 +120,8 @@ def vector_values(vectors: Vectors) -> Float32Array:
     """The vectors (3, G, k), or (3, G, 1) where each group has one."""
     if isinstance(vectors, PointVectors):
         return vectors.values
-    form = vectors.planes.transpose(1, 0, 2)  # all axes at once, as so many more microtiles
-    return single_values(form.reshape(3, -1)).reshape(3, -1, 64)
+    form = vectors.planes.transpose(1, 0, 2)  # all axes at once, as so many more squares
+    return single_values(form.reshape(3, -1), vectors.side).reshape(3, form.shape[2], -1)
 
 
 def along(vectors: Vectors, direction: Float32Array) -> Float32Array:
@@ -110,18 +129,18 @@ def along(vectors: Vectors, direction: Float32Array) -> Float32Array:
     if isinstance(vectors, PointVectors):
         return sum_of_products(vectors.values, direction)
     if isinstance(vectors, BlockVectors):
-        return single_values(vectors.along(direction))
-    return single_values(sum_of_products(vectors.planes, direction))
+        return single_values(vectors.along(direction), vectors.side)
+    return single_values(sum_of_products(vectors.planes, direction), vectors.side)
 
 
 def products(a: Vectors, b: Vectors) -> Float32Array:
     """Products (G, k) or (G, 1) of vectors, pixel by pixel."""
     if isinstance(a, BlockVectors) and a is b:
-        return single_values(a.squares)
+        return single_values(a.lengths2, a.side)
     if isinstance(a, PointVectors) and isinstance(b, BlockVectors) and a.values.shape[2] == 1:
-        return single_values(b.onto(a.values))
+        return single_values(b.onto(a.values), b.side)
     if not isinstance(a, PointVectors) and not isinstance(b, PointVectors):
-        return single_values(_quadratic(a.planes, b.planes))
+        return single_values(_quadratic(a.planes, b.planes), a.side)
     return sum_of_products(vector_values(a), vector_values(b))
 
 
@@ -133,26 +152,27 @@ def _quadratic(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.stack([part[0] + part[1] + part[2] for part in parts])
 
 
-def grid_values(form: FloatArray) -> FloatArray:
-    """Values (G, 64) of forms at the pixels of microtiles, from their first pixel.
+def grid_values(form: FloatArray, side: int = 1) -> FloatArray:
+    """Values (G, 64·side²) of forms at the pixels of squares, row by row, from their first pixel.
 
     Args:
         form: planes (3, G) of x, y and 1, or quadratics (6, G) of x², xy, y², x, y and 1; on grids on which
             every sum is exact, so that neither the order of the sums nor the machine can be told.
+        side: how many microtiles are the side of a square.
     """
-    return np.asarray(form.T @ _BASIS_OF[len(form)])
+    return np.asarray(form.T @ _basis(len(form), side))
 
 
-def exact_values(form: FloatArray) -> FloatArray:
+def exact_values(form: FloatArray, side: int = 1) -> FloatArray:
     """As `grid_values`, of any forms: they are rounded to such grids before."""
-    return grid_values(on_grid(form))
+    return grid_values(on_grid(form, side), side)
 
 
-def on_grid(form: FloatArray) -> FloatArray:
-    """Forms (..., 3 or 6, G) rounded to grids on which every sum over a microtile is exact."""
+def on_grid(form: FloatArray, side: int = 1) -> FloatArray:
+    """Forms (..., 3 or 6, G) rounded to grids on which every sum over a square is exact."""
     terms = form.shape[-2]
     reach = np.abs(form)
-    reach *= _WEIGHT_OF[terms][:, None]
+    reach *= _reach(terms, side)
     greatest = reach.max(axis=-2, keepdims=True)
     scale = power_of_two(np.maximum(greatest, 1e-300, out=greatest))  # at or below the greatest term
     grid = form / scale
@@ -162,9 +182,9 @@ def on_grid(form: FloatArray) -> FloatArray:
     return grid
 
 
-def single_values(form: FloatArray) -> Float32Array:
+def single_values(form: FloatArray, side: int = 1) -> Float32Array:
     """As `exact_values`, rounded once to single precision."""
-    return exact_values(form).astype(np.float32)
+    return exact_values(form, side).astype(np.float32)
 
 
 def sum_of_products(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:

@@ -21,9 +21,9 @@ from quiltcli.raster.planes import PlaneTable
 from quiltcli.raster.reader import Reader
 from quiltcli.raster.surfaces import has_one_normal
 from quiltcli.raster.tiles import Tiles, in_parts, owned_pixels, tiles_at
-from quiltcli.raster.whole import TileShader, tile_hits, whole_tiles
+from quiltcli.raster.whole import TileShader, shaded_hits, tile_hits, whole_tiles
 
-_WHOLE, _PIXELS = 4096, 512  # microtiles at a time
+_WHOLE, _PIXELS = 4096, 512  # squares, or microtiles, at a time
 SQUARE = 4
 """Microtiles from side to side of the squares that are looked for: a power of two."""
 
@@ -59,21 +59,27 @@ def read_canvas(
     if wanted.normals is not None:
         is_even = has_one_normal(wanted.normals, triangle)
     border = ~tiles.interior[whole]
-    squares = np.zeros(0, dtype=np.int64)
+    alone = np.ones(whole.size, dtype=np.bool_)
     if shader is not None:
         squares = _squares(canvas, tiles, np.where(border, -1, serial[whole]), whole)
-    alone = np.ones(whole.size, dtype=np.bool_)
-    alone[squares] = False
-    kinds = [(squares[is_even[squares] == even], even, False, SQUARE) for even in (True, False)]
-    kinds += [
-        (np.flatnonzero(alone & (border == at_border) & (is_even == even)), even, at_border, 1)
-        for at_border in (False, True)
-        for even in (True, False)
-    ]
-    for chosen, even, at_border, side in kinds:
-        for some in in_parts(whole[chosen], _WHOLE):
-            found = whole_tiles(reader, tiles[some], serial[some], even=even, border=at_border, side=side)
-            yield from tile_hits(found, shader)
+        for even in (True, False):
+            for some in in_parts(squares[is_even[squares[:, 0]] == even], _WHOLE):
+                first = whole[some[:, 0]]
+                found = whole_tiles(reader, tiles[first], serial[first], even=even, border=False, side=SQUARE)
+                calm = shader.calm(found)
+                alone[some[calm]] = False
+                yield from shaded_hits(found, shader, calm)
+    for at_border in (False, True):
+        for even in (True, False):
+            chosen = np.flatnonzero(alone & (border == at_border) & (is_even == even))
+            for some in in_parts(whole[chosen], _WHOLE):
+                found = whole_tiles(reader, tiles[some], serial[some], even=even, border=at_border, side=1)
+                if shader is None:
+                    yield from tile_hits(found)
+                    continue
+                calm = shader.calm(found)
+                yield from shaded_hits(found, shader, calm)
+                yield from tile_hits(found.of(~calm))
     for part in in_parts(np.flatnonzero(complete), _PIXELS):
         yield _complete_tiles(reader, tiles[part])
     for part in in_parts(np.flatnonzero(~complete & (serial < 0)), _PIXELS):
@@ -92,7 +98,7 @@ def _squares(canvas: Canvas, tiles: Tiles, serial: IntArray, whole: IntArray) ->
         whole: (n,) indices into `tiles`.
 
     Returns:
-        (S·SQUARE²,) places in `whole`, square by square, each row by row.
+        (S, SQUARE²) places in `whole`, those of the squares' first microtiles first.
     """
     filled = np.full(canvas.touched.size, -1, dtype=np.int64)
     place = np.zeros(canvas.touched.size, dtype=np.int64)
@@ -107,7 +113,7 @@ def _squares(canvas: Canvas, tiles: Tiles, serial: IntArray, whole: IntArray) ->
     cells = index[first, None, None] + across[first, None, None] * offsets[:, None] + offsets
     cells = cells.reshape(-1, SQUARE**2)
     same = (filled.take(cells) == serial[first, None]).all(axis=1)
-    found: IntArray = place.take(cells[same].reshape(-1))
+    found: IntArray = place.take(cells[same])
     return found
 
 

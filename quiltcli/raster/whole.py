@@ -1,10 +1,9 @@
-"""Microtiles that one triangle fills each: their planes are looked up once and evaluated over 64 pixels."""
+"""Microtiles, and squares of them, that one triangle fills: its planes are looked up once for all pixels."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -24,10 +23,10 @@ _AT_A_TIME = 2048
 
 @dataclass(frozen=True)
 class WholeTiles:
-    """G microtiles, each filled by one triangle.
+    """G squares of microtiles, each filled by one triangle.
 
     Attributes:
-        tiles: where they lie.
+        tiles: where their first microtiles lie.
         triangle: (G,) triangle index.
         rays: rays through their pixels.
         inverse: (3, G) planes of 1/t on grids (`vectors.grid_values`), from their first pixels.
@@ -35,8 +34,7 @@ class WholeTiles:
         weights: (3, 3, G) planes, on grids, of the second and third edge function and of the sum of all;
             none unless wanted, (0, 3, G).
         border: the blocks, where some pixels are not the facet's; None where all are.
-        side: how many microtiles are the side of a square of them that is filled by one triangle; squares
-            come one after the other, each row by row.
+        side: how many microtiles are the side of a square; 1 where some pixels are not the facet's.
     """
 
     tiles: Tiles
@@ -49,7 +47,7 @@ class WholeTiles:
     side: int = 1
 
     def __getitem__(self, part: slice | IntArray) -> WholeTiles:
-        """Some of the microtiles."""
+        """Some of the squares."""
         return WholeTiles(
             tiles=self.tiles[part],
             triangle=self.triangle[part],
@@ -61,22 +59,17 @@ class WholeTiles:
             side=self.side,
         )
 
+    def of(self, chosen: BoolArray) -> WholeTiles:
+        """The chosen (G,) of them."""
+        return self if chosen.all() else self[np.flatnonzero(chosen)]
+
     @property
     def nodes(self) -> Nodes:
         """The nodes of the squares."""
         return nodes_of(self.side)
 
-    @cached_property
-    def squares(self) -> WholeTiles:
-        """The first microtile of every square: its planes are those of the square."""
-        return self[:: self.side**2]
-
-    def of(self, squares: BoolArray) -> WholeTiles:
-        """The microtiles of some squares (S,)."""
-        return self if squares.all() else self[np.flatnonzero(squares.repeat(self.side**2))]
-
     def at_nodes(self) -> Points:
-        """What is seen at the nodes of `squares`."""
+        """What is seen at the nodes."""
         nodes = self.nodes
         weights = position = None
         if len(self.weights):
@@ -94,12 +87,12 @@ class WholeTiles:
 
     def hits(self, colors: NodeColors | None) -> Hits:
         """What their pixels see; `colors` are those at the nodes, if they are known."""
-        inverse = grid_values(self.inverse)
+        inverse = grid_values(self.inverse, self.side)
         depth, position = self.rays.values()
         depth /= inverse
         weights = None
         if len(self.weights):
-            second, third, total = (grid_values(plane) for plane in self.weights)
+            second, third, total = (grid_values(plane, self.side) for plane in self.weights)
             weights = np.stack((second / total, third / total)).astype(np.float32)
         places, chosen, inside = self._places(depth.shape)
         return Hits(
@@ -119,7 +112,7 @@ class WholeTiles:
     def _places(self, shape: tuple[int, ...]) -> tuple[Places, IntArray | None, int]:
         """Where the pixels lie that are drawn; which these are; how many are no bleed."""
         if self.border is None:
-            return self.tiles.places(), None, shape[0] * shape[1]
+            return self.tiles.places(self.side), None, shape[0] * shape[1]
         pixel, address, inside = owned_pixels(self.border, self.tiles, np.ones(shape, dtype=np.bool_))
         return Places(address, 1), pixel, inside
 
@@ -128,7 +121,7 @@ class TileShader(Protocol):
     """Whoever can shade squares of microtiles by their nodes."""
 
     def calm(self, squares: WholeTiles) -> BoolArray:
-        """Which squares (S,) nodes tell enough of."""
+        """Which squares (G,) nodes tell enough of."""
 
     def colors(self, squares: WholeTiles) -> NodeColors:
         """Colours at the nodes of squares."""
@@ -137,15 +130,15 @@ class TileShader(Protocol):
 def whole_tiles(
     reader: Reader, tiles: Tiles, serial: IntArray, *, even: bool, border: bool, side: int
 ) -> WholeTiles:
-    """Microtiles (G,) that one pair each fills.
+    """Squares (G,) that one pair each fills.
 
     Args:
         reader: the canvas.
-        tiles: where they lie.
+        tiles: where their first microtiles lie.
         serial: (G,) the pairs.
         even: whether each of their triangles has one normal.
         border: whether some of their pixels are not the facet's.
-        side: the microtiles are squares of so many.
+        side: how many microtiles are their side.
     """
     planes, wanted, handed = reader.table.planes, reader.wanted, reader.limits.handed
     rows = reader.table.row_of_serial.take(serial)
@@ -155,37 +148,29 @@ def whole_tiles(
         wanted = replace(wanted, normals=None)
     seen = surfaces(planes, rows, wanted, handed, tiles.x, tiles.y)
     if wanted.normals is not None:
-        normal = TileVectors(seen.normal.astype(np.float64))
+        normal = TileVectors(seen.normal.astype(np.float64), side)
     return WholeTiles(
         tiles=tiles,
         triangle=seen.triangle,
-        rays=rays_through(reader, tiles),
+        rays=rays_through(reader, tiles, side),
         inverse=moved(np.take(planes.inverse, rows, axis=1), tiles.x, tiles.y),
         normal=normal,
-        weights=on_grid(seen.weights),
+        weights=on_grid(seen.weights, side),
         border=reader.blocks if border else None,
         side=side,
     )
 
 
-def tile_hits(tiles: WholeTiles, shader: TileShader | None) -> Iterator[Hits]:
-    """Hits of microtiles, a cache-sized number at a time; shaded at their nodes where that is enough.
-
-    Squares for which it is not are shaded by their microtiles.
-    """
-    if shader is None:
-        yield from _in_parts(tiles, None)
-        return
-    calm = shader.calm(tiles.squares)
+def shaded_hits(tiles: WholeTiles, shader: TileShader, calm: BoolArray) -> Iterator[Hits]:
+    """Hits of the `calm` (G,) squares, with their colours."""
     if calm.any():
         some = tiles.of(calm)
-        yield from _in_parts(some, shader.colors(some.squares))
-    if not calm.all():
-        rest = replace(tiles.of(~calm), side=1)
-        yield from _in_parts(rest, None) if tiles.side == 1 else tile_hits(rest, shader)
+        yield from tile_hits(some, shader.colors(some))
 
 
-def _in_parts(tiles: WholeTiles, colors: NodeColors | None) -> Iterator[Hits]:
-    for at in range(0, tiles.triangle.size, _AT_A_TIME):
-        part = slice(at, min(at + _AT_A_TIME, tiles.triangle.size))
+def tile_hits(tiles: WholeTiles, colors: NodeColors | None = None) -> Iterator[Hits]:
+    """Hits of squares, a cache-sized number at a time; `colors` are those at the nodes, if they are known."""
+    step = _AT_A_TIME // tiles.side**2
+    for at in range(0, tiles.triangle.size, step):
+        part = slice(at, min(at + step, tiles.triangle.size))
         yield tiles[part].hits(None if colors is None else colors[part])
