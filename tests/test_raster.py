@@ -278,3 +278,57 @@ def test_a_canvas_in_memory_that_was_used_shows_nothing_of_it():
                     hits.put(seen, hits.triangle[:, None])
                 drawing.done()
             np.testing.assert_array_equal(seen, one.triangle)
+
+
+def evaluated(monkeypatch, points, triangles):
+    """How many pixels large triangles take to evaluate, and what is seen."""
+    count = []
+    draw_large = raster.draw_large
+    monkeypatch.setattr(raster, "draw_large", lambda *given: count.append(draw_large(*given)))
+    shown = picture(panel(density=150), points, triangles, FRONT)
+    monkeypatch.setattr(raster, "draw_large", draw_large)
+    return sum(count), shown
+
+
+def test_the_far_side_of_a_thin_wall_takes_no_work(monkeypatch):
+    """Seen at a slant, depth differs by more across a microtile than from one side to the other."""
+    near = np.array([(-6, -2, -3.5), (6, -2, 1), (0, 8, -1.2)])
+    alone, one = evaluated(monkeypatch, near, [(0, 1, 2)])
+    both = np.concatenate((near, near - (0, 0, 0.001)))
+    together, two = evaluated(monkeypatch, both, [(0, 1, 2), (3, 5, 4)])
+    assert together == 2 * alone < 1000  # where the walls end
+    assert (one.triangle >= 0).sum() > 10_000
+    np.testing.assert_array_equal(two.triangle, one.triangle)
+    np.testing.assert_array_equal(two.depth, one.depth)
+
+
+def test_what_several_surfaces_hide_together_takes_little_work(monkeypatch):
+    """Patches of some ten pixels, none of which fills a microtile, before the same turned over."""
+    points, triangles = split_grid(np.random.default_rng(3), 12, 0)
+    front = on_panel(points)
+    triangles = triangles[:, ::-1]  # counter-clockwise
+    alone, one = evaluated(monkeypatch, front, triangles)
+    count, size = len(front), len(triangles)
+    both = np.concatenate((front, front - (0, 0, 0.1)))
+    together, two = evaluated(monkeypatch, both, np.concatenate((triangles, count + triangles[:, ::-1])))
+    assert alone > size * 64
+    assert together < 1.4 * alone
+    seen = one.triangle >= 0
+    np.testing.assert_array_equal(two.triangle[seen], one.triangle[seen])
+
+
+def test_the_least_key_of_a_microtile_is_that_of_pixels_the_facet_owns():
+    vertices, triangles = icosphere(1)
+    facets = display(vertices, triangles.tolist(), 140)
+    shown = picture(facets, vertices * 0.7, triangles, viewer((2.2, 1.8, 3.2)))
+    found = 0
+    for batch in raster.batches(shown.frame):
+        canvas = raster.draw(shown.frame, batch).canvas
+        owned = np.unpackbits(canvas.owned, axis=1).view(bool)
+        least = raster_blocks.least_keys(canvas)
+        none = np.iinfo(np.int64).max
+        for tile in np.flatnonzero(canvas.touched & canvas.used):
+            assert least[tile] == np.where(owned[tile], canvas.keys[tile], none).min()
+            found += bool(least[tile] and not canvas.keys[tile].all())
+        assert (least[~canvas.used] > least[canvas.used].max()).all()
+    assert found > 20

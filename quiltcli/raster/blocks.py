@@ -22,6 +22,8 @@ T = TypeVar("T", bound=np.generic)
 SIDE = 512
 BATCH_PIXELS = 1 << 20
 BATCH_PAIRS = 1 << 17
+_NOT_SEEN = np.float64(np.inf).view(np.int64)
+"""A key that nothing lies in front of."""
 
 
 @dataclass(frozen=True)
@@ -215,10 +217,11 @@ class Canvas:
         tiles_down: (K,) from top to bottom.
         place: (M,) every microtile's block, by its place in the batch.
         number: (M,) every microtile's index among those of all blocks.
-        used: (M,) microtiles that have pixels of their facet; nothing needs to be drawn in others.
+        owned: (M, 8) uint8, bits of the pixels that are the facet's or its bleed, row by row.
+        used: (M,) microtiles that have such pixels; nothing needs to be drawn in others.
         keys: (M, 64) int64 depth keys, 0 where nothing has been drawn.
         touched: (M,) microtiles that have keys.
-        full: (M,) those of them that are known to have nothing but keys.
+        full: (M,) those of them whose owned pixels are known to have keys, all of them.
         filler: (M,) one more than the serial of the one pair that shows in a microtile, fills it and
             so needs no keys; 0 where there is none.
     """
@@ -229,6 +232,7 @@ class Canvas:
     tiles_down: IntArray
     place: IntArray
     number: IntArray
+    owned: NDArray[np.uint8]
     used: BoolArray
     keys: IntArray
     touched: BoolArray
@@ -255,6 +259,7 @@ def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
         tiles_down=tiles // across,
         place=place,
         number=number,
+        owned=blocks.owned.take(number, axis=0),
         used=blocks.used.take(number),
         keys=_empty_keys(count),
         touched=np.zeros(count, dtype=np.bool_),
@@ -284,11 +289,22 @@ def give_back(canvas: Canvas) -> None:
     _SPARE.keys = canvas.keys if canvas.keys.base is None else canvas.keys.base
 
 
-def least_keys(canvas: Canvas) -> IntArray:
-    """The least key (M,) of every microtile, looked for where there are any."""
+def least_keys(canvas: Canvas, among: BoolArray | None = None) -> IntArray:
+    """The least key (M,) at pixels that are the facet's or its bleed, of every microtile.
+
+    Args:
+        canvas: what has been drawn.
+        among: (M,) the only microtiles that are looked at, None for all; others are told to have 0.
+    """
     least = np.zeros(canvas.touched.size, dtype=np.int64)
-    touched = np.flatnonzero(canvas.touched)
-    least[touched] = canvas.keys.take(touched, axis=0).min(axis=1)
+    least[~canvas.used] = _NOT_SEEN
+    touched = np.flatnonzero(canvas.touched if among is None else canvas.touched & among)
+    keys, owned = canvas.keys.take(touched, axis=0), canvas.owned.take(touched, axis=0)
+    least[touched] = keys.min(axis=1)
+    # The other pixels of a microtile on the facet's edge may well be bare.
+    partly = np.flatnonzero((owned != 255).any(axis=1))
+    mine = np.unpackbits(owned.take(partly, axis=0), axis=1).view(np.bool_)
+    least[touched[partly]] = np.where(mine, keys.take(partly, axis=0), _NOT_SEEN).min(axis=1)
     return least
 
 

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
 from quiltcli.raster.blocks import SIDE, Canvas, least_keys
 from quiltcli.raster.depth import DepthRange
-from quiltcli.raster.keys import depth_part, make_keys, serial_part
+from quiltcli.raster.keys import depth_part, make_keys, serial_of, serial_part
 from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import Planes, moved
+from quiltcli.raster.surfaces import facing
 from quiltcli.raster.vectors import BASIS
 
 MICROTILE = 8
@@ -30,6 +31,7 @@ _CLASS_OF = np.searchsorted(np.asarray(_SIZES), np.arange(_ACROSS + 1))
 _CELLS = 1 << 15
 _ROUND = 512
 _EARLY = 3
+_CLEARLY = 2.0**-24  # as a share of 1/t: more than keys and the rounding of planes can tell
 _X, _Y = (BASIS[k] for k in (0, 1))
 
 
@@ -86,10 +88,11 @@ def large_spans(planes: Planes, canvas: Canvas, by: BatchOrder | None = None) ->
 
 def covering_keys(planes: Planes, spans: Spans, canvas: Canvas, bits: int) -> IntArray:
     """Keys (M,) that every pixel of a microtile will have at least, for a pair covers it; 0 for none."""
-    nearest = np.zeros(canvas.touched.size)
+    nearest = np.zeros(canvas.touched.size, dtype=np.int64)
     covers = np.flatnonzero((spans.crossed == 0) & ~planes.cut.take(spans.row))
-    np.maximum.at(nearest, spans.tile[covers], spans.least[covers])
-    return nearest.view(np.int64) & ~np.int64((1 << bits) - 1)
+    serial = serial_part(planes.serial.take(spans.row[covers]), bits)
+    np.maximum.at(nearest, spans.tile[covers], make_keys(spans.least[covers], serial, bits))
+    return nearest
 
 
 def draw_large(
@@ -115,14 +118,23 @@ def draw_large(
     Returns:
         Number of pixels that were evaluated.
     """
+    drawn = 0
     if covering is not None:
         least = least_keys(canvas)
         np.greater(least, 0, out=canvas.full)
-        nearest = depth_part(np.maximum(least, covering), bits)
-        spans = spans.take(np.flatnonzero(spans.greatest >= nearest.take(spans.tile)))
+        spans = _not_behind(spans, np.maximum(least, covering), bits)
+        spans = spans.take(np.flatnonzero(~_behind_cover(planes, spans, covering, bits)))
         spans = _fill(planes, spans, canvas)
+        # Backs and walls come last: pieces of other surfaces may hide them together.
+        last = (spans.crossed == 0) | (facing(planes, spans.row, limits.handed) < 0)
+        first, spans = spans.take(np.flatnonzero(~last)), spans.take(np.flatnonzero(last))
+        _draw_rounds(planes, first, canvas, limits, bits, by)
+        drawn = first.row.size
+        left = np.zeros(canvas.touched.size, dtype=np.bool_)
+        left[spans.tile] = True
+        spans = _not_behind(spans, least_keys(canvas, left), bits)
     _draw_rounds(planes, spans, canvas, limits, bits, by)
-    return spans.row.size * MICROTILE * MICROTILE
+    return (drawn + spans.row.size) * MICROTILE * MICROTILE
 
 
 def _pieces(planes: Planes, hide: bool) -> Pieces:
@@ -274,6 +286,33 @@ def _corner_values(
     down = np.minimum(reach_x, 0) + np.minimum(reach_y, 0)
     up = np.maximum(reach_x, 0) + np.maximum(reach_y, 0)
     return values, down, up
+
+
+def _not_behind(spans: Spans, least: IntArray, bits: int) -> Spans:
+    """The spans that are not wholly behind the `least` keys (M,) that the pixels of their microtiles have."""
+    return spans.take(np.flatnonzero(spans.greatest >= depth_part(least, bits).take(spans.tile)))
+
+
+def _behind_cover(planes: Planes, spans: Spans, covering: IntArray, bits: int) -> BoolArray:
+    """Which spans (S,) lie, pixel by pixel, behind the pair that covers their microtile.
+
+    So does the far side of a thin wall, though somewhere in the microtile it is nearer than the near
+    side is elsewhere.
+    """
+    result = np.zeros(spans.row.size, dtype=np.bool_)
+    key = covering.take(spans.tile)
+    some = np.flatnonzero(key)
+    row_of_serial = np.empty(int(planes.serial.max(initial=0)) + 1, dtype=np.int64)
+    row_of_serial[planes.serial] = np.arange(planes.serial.size)
+    cover, row = row_of_serial.take(serial_of(key.take(some), bits)), spans.row.take(some)
+    behind = np.take(planes.inverse, row, axis=1)
+    behind -= (1 - _CLEARLY) * np.take(planes.inverse, cover, axis=1)
+    a, b, c = moved(behind, spans.x.take(some), spans.y.take(some))
+    c += np.maximum(a * (MICROTILE - 1), 0) + np.maximum(b * (MICROTILE - 1), 0)
+    # What is drawn of a sliver is held to its corners.
+    held = planes.low.take(row) < (1 - _CLEARLY) * depth_part(key.take(some), bits)
+    result[some] = (c < 0) & held & (cover != row)
+    return result
 
 
 def _fill(planes: Planes, spans: Spans, canvas: Canvas) -> Spans:

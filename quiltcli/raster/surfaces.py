@@ -57,7 +57,7 @@ def surfaces(
         edge = moved(np.take(planes.edge, rows, axis=2), x, y)
         edge[0] += edge[1]
         edge[0] += edge[2]
-        edge *= _facing(planes, rows, handed)
+        edge *= facing(planes, rows, handed)
         if wanted.normals is not None:
             normal = _normals(wanted.normals.take(triangle, axis=0), edge)
         if wanted.weights:
@@ -69,7 +69,7 @@ def surfaces(
     )
 
 
-def _facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
+def facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
     """1 for pairs (n,) whose triangle's front the eye sees, −1 for those it sees from behind."""
     result: FloatArray = planes.turn.take(rows) * -handed.take(planes.block.take(rows))
     return result
@@ -86,10 +86,10 @@ def one_normal(table: Float32Array, planes: Planes, rows: IntArray, handed: Floa
     Returns:
         (3, n, 1), or (3, 1, 1) where all are the same.
     """
-    triangle, facing = planes.triangle.take(rows), _facing(planes, rows, handed)
-    if bool((triangle == triangle[0]).all() and (facing == facing[0]).all()):
-        triangle, facing = triangle[:1], facing[:1]
-    normal = table.take(triangle, axis=0).T[0:3] * facing
+    triangle, side = planes.triangle.take(rows), facing(planes, rows, handed)
+    if bool((triangle == triangle[0]).all() and (side == side[0]).all()):
+        triangle, side = triangle[:1], side[:1]
+    normal = table.take(triangle, axis=0).T[0:3] * side
     return PointVectors(normal.astype(np.float32)[:, :, None])
 
 
