@@ -9,6 +9,7 @@ from rig import cube, display, icosphere, panel, picture, pixel_rays, viewer
 from quiltcli import raster
 from quiltcli.geometry import dot
 from quiltcli.raster import blocks as raster_blocks
+from quiltcli.raster import small
 
 FRONT = viewer((0, 0, 2))
 # One panel of 64 × 64 pixels, whose pixel (i, j) is the point (i/32 − 1, 1 − j/32, 0).
@@ -195,6 +196,24 @@ def test_small_and_large_paths_see_the_same(monkeypatch):
     assert (small_too.triangle >= 0).sum() > 300
     np.testing.assert_array_equal(small_too.triangle, large_only.triangle)
     np.testing.assert_allclose(small_too.depth, large_only.depth, rtol=1e-13)
+
+
+@pytest.mark.parametrize("classes", [0, 1, 2])
+@pytest.mark.parametrize("width", [3, 8, 11, 40])
+def test_coarse_classes_of_boxes_see_what_large_paths_see(monkeypatch, classes, width):
+    """On facets as wide as they like, of which the narrowest are a microtile."""
+    rng = np.random.default_rng(width)
+    at = rng.uniform(-0.5, 0.5, (400, 1, 2)) * (width, 40)
+    pixel = (at + rng.uniform(-1, 1, (400, 3, 2)) * rng.uniform(0.2, 7, (400, 1, 1))).reshape(-1, 2)
+    points = np.column_stack((pixel / 32, rng.uniform(-0.1, 0, 1200)))
+    facets, triangles = panel(width / 32, 40 / 32), np.arange(1200).reshape(-1, 3)
+    monkeypatch.setattr(small, "_CLASSES", ((0, small._CLASSES[classes][1]),))
+    by_boxes = picture(facets, points, triangles, FRONT, bleed=0)
+    monkeypatch.setattr(raster, "LIMIT", 0)
+    by_tiles = picture(facets, points, triangles, FRONT, bleed=0)
+    assert (by_boxes.triangle >= 0).sum() > 20 * width
+    np.testing.assert_array_equal(by_boxes.triangle, by_tiles.triangle)
+    np.testing.assert_allclose(by_boxes.depth, by_tiles.depth, rtol=1e-13)
 
 
 def test_blocks_do_not_show(monkeypatch):

@@ -20,20 +20,31 @@ from quiltcli.raster.keys import make_keys, serial_part
 from quiltcli.raster.order import BatchOrder
 from quiltcli.raster.planes import Planes, PlaneTable, Warped, depth_bounds
 
-SIZES = (1, 2, 3, 4, 6, 8, 12)
+SIZES = (2, 3, 4, 6, 8, 12)
 LIMIT = SIZES[-1]
 _RUN = 1 << 16
 _CANDIDATES = 1 << 16
 _SHAPES = len(SIZES) ** 2
 _SOME = 8  # of so many microtiles one has to be covered for a look at all pairs to be worth its time
-_CLASS_OF = np.searchsorted(np.asarray(SIZES), np.arange(LIMIT + 1)).astype(np.uint16)
+
+
+def _class_of(sizes: tuple[int, ...]) -> NDArray[np.uint16]:
+    """For a length (LIMIT + 1,) the place in SIZES of the least of these that holds it."""
+    least = np.asarray(sizes)[np.searchsorted(np.asarray(sizes), np.arange(LIMIT + 1))]
+    return np.searchsorted(np.asarray(SIZES), least).astype(np.uint16)
+
+
+# A class of few pairs takes as long as one of many: fewer classes then, and larger boxes. Up to a
+# microtile wide stays so, for no block is less.
+_CLASSES = ((1 << 14, _class_of(SIZES)), (1 << 12, _class_of((2, 4, 8, 12))), (0, _class_of((4, 8, 12))))
 
 
 def size_classes(pairs: Warped, rows: IntArray) -> NDArray[np.uint16]:
     """Class (R,) of the boxes of some pairs: their shape, and whether depth must be tested."""
     first_x, last_x, first_y, last_y = np.take(pairs.box, rows, axis=1)
-    classes: NDArray[np.uint16] = _CLASS_OF.take(last_y - first_y + 1) * np.uint16(len(SIZES))
-    classes += _CLASS_OF.take(last_x - first_x + 1)
+    class_of = next(table for least, table in _CLASSES if rows.size >= least)
+    classes: NDArray[np.uint16] = class_of.take(last_y - first_y + 1) * np.uint16(len(SIZES))
+    classes += class_of.take(last_x - first_x + 1)
     classes += pairs.cut.take(rows) * np.uint16(_SHAPES)
     return classes
 
@@ -85,21 +96,31 @@ def draw_small(
     """
     if covering is not None and np.count_nonzero(covering) * _SOME > covering.size:
         rows = rows[~_hidden(pairs, rows, covering, canvas, bits)]
-    classes = size_classes(pairs, rows)
-    behind = np.zeros(rows.size, dtype=np.bool_)
+    front, back = rows, rows[:0]
     if not culled:
         behind = seen_from_behind(pairs.corners, limits.handed.take(pairs.block)).take(rows)
-    order = np.argsort(classes + behind * np.uint16(2 * _SHAPES), kind="stable")
-    turn = order.size - int(np.count_nonzero(behind))
+        front, back = rows[~behind], rows[behind]
+    candidates = _draw(pairs, front, table, canvas, limits, bits, by)
+    if back.size and by is None:
+        back = back[~_hidden(pairs, back, least_keys(canvas), canvas, bits)]
+    return candidates + _draw(pairs, back, table, canvas, limits, bits, by)
+
+
+def _draw(
+    pairs: Warped,
+    rows: IntArray,
+    table: PlaneTable,
+    canvas: Canvas,
+    limits: DepthRange,
+    bits: int,
+    by: BatchOrder | None,
+) -> int:
+    """Draw pairs by classes; the number of candidate pixels."""
+    classes = size_classes(pairs, rows)
+    order = np.argsort(classes, kind="stable")
     candidates = 0
-    for part in _slices(0, turn, _RUN):
+    for part in _slices(0, order.size, _RUN):
         run = order[part]
-        candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by)
-    nearest = least_keys(canvas) if by is None and turn < order.size else None
-    for part in _slices(turn, order.size, _RUN):
-        run = order[part]
-        if nearest is not None:
-            run = run[~_hidden(pairs, rows[run], nearest, canvas, bits)]
         candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by)
     return candidates
 
@@ -164,10 +185,14 @@ def _draw_boxes(
     """Draw pairs whose boxes all have this (height, width)."""
     height, width = shape
     block = planes.block
-    across, down = canvas.tiles_across.take(block), canvas.tiles_down.take(block)
+    # Numbers of 32 bits are enough for addresses in a batch, and half the memory.
+    across, down, start = (
+        column.astype(np.int32).take(block)
+        for column in (canvas.tiles_across, canvas.tiles_down, canvas.tile_start)
+    )
     # A box smaller than its class is widened, to the left or up at the block's far edges.
-    x = np.minimum(planes.box[0], across * 8 - width) + np.arange(width)[:, None]
-    y = np.minimum(planes.box[2], down * 8 - height) + np.arange(height)[:, None]
+    x = np.minimum(planes.box[0], across * 8 - width) + np.arange(width, dtype=np.int32)[:, None]
+    y = np.minimum(planes.box[2], down * 8 - height) + np.arange(height, dtype=np.int32)[:, None]
     fx, fy = x.astype(np.float64), y.astype(np.float64)
     inside = _evaluate(planes.edge[0], fx, fy)
     for k in (1, 2):
@@ -182,8 +207,8 @@ def _draw_boxes(
     if by is not None:
         inverse = by.values(block, fx[None, :, :], fy[:, None, :], inverse)
     column = x + (x >> 3) * 56
-    row = (y >> 3) * (across * 64) + (y & 7) * 8 + canvas.tile_start.take(block) * 64
-    address = (row[:, None, :] + column).ravel().take(drawn)
+    row = (y >> 3) * (across * 64) + (y & 7) * 8 + start * 64
+    address = (row[:, None, :] + column).ravel().take(drawn).astype(np.int64)
     keys = make_keys(inverse, serial_part(planes.serial, bits), bits).ravel().take(drawn)
     np.maximum.at(canvas.keys.reshape(-1), address, keys)
     canvas.touched[address >> 6] = True
