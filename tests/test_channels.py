@@ -10,7 +10,7 @@ from wallscene import EYE, STRAIGHT, hits, lights, wall
 
 from quiltcli.channels import CHANNELS, canonical_depth, empty_buffers, exr_channels, fill
 from quiltcli.job.render import CHANNELS as KNOWN_TO_JOBS
-from quiltcli.raster.hits import Places
+from quiltcli.raster.hits import single_places
 from quiltcli.viewer import Viewer
 
 VIEWER = Viewer(1, EYE, np.array([0.0, 0, -1]), np.array([0.0, 1, 0]), 0.5, 10.0, "planar")
@@ -83,5 +83,5 @@ def test_normals_face_the_eye():
 
 
 def test_hits_go_to_their_own_pixels():
-    seen = replace(hits([[0.0, 0], [0, 0], [-2, -3]]), places=Places(np.array([3, 1]), 1))
+    seen = replace(hits([[0.0, 0], [0, 0], [-2, -3]]), places=single_places(np.array([3, 1])))
     assert filled("Z", seen=seen, pixels=4)["Z"].tolist() == [np.inf, 3, np.inf, 2]

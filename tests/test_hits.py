@@ -9,7 +9,7 @@ import pytest
 from wallscene import hits
 
 from quiltcli.channels import half_floats
-from quiltcli.raster.hits import RUN, Places
+from quiltcli.raster.hits import RUN, Places, single_places
 from quiltcli.raster.vectors import (
     BASIS,
     BlockVectors,
@@ -129,27 +129,33 @@ def test_products_with_one_normal_do_not_depend_on_how_often_it_is_given():
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.uint32])
-def test_runs_go_to_eight_neighbours_wherever_they_begin(kind):
-    first = np.array([3, 40, 17, 92 - RUN])
-    values = np.arange(32).reshape(2, 16)
+@pytest.mark.parametrize("run", [RUN, 4 * RUN])
+@pytest.mark.parametrize("first", [(0, 2, 3), (1, 7, 4), (1, 7.5, 4), (0.125, 3, 9.25)])
+@pytest.mark.parametrize("single", [(), (90, 88)])
+def test_runs_go_to_neighbours_wherever_they_begin(kind, run, first, single):
+    first, size = (np.array(first) * run).astype(int), 12 * run + 3
+    single = np.array(single, int) * run // RUN
+    count = 3 * run + single.size
+    values = np.arange(count)
     one = hits(np.zeros((3, 1)))
-    seen = replace(one, places=Places(first, RUN), depth=np.zeros((2, 16)))
-    buffer = np.full(92, 99, kind)
-    seen.put(buffer, values)
-    expected = np.full(92, 99, kind)
-    expected[seen.pixel] = values.reshape(-1)
+    seen = replace(one, places=Places(first, run, single), depth=np.zeros((1, count)))
+    assert np.unique(seen.pixel).size == count
+    buffer = np.full(size, 999, kind)
+    seen.put(buffer, values[None])
+    expected = np.full(size, 999, kind)
+    expected[seen.pixel] = values
     np.testing.assert_array_equal(buffer, expected)
-    assert np.count_nonzero(buffer != 99) == 32
-    seen.put(buffer, np.array([[5], [7]]))
-    np.testing.assert_array_equal(buffer[seen.pixel], np.repeat([5, 7], 16))
-    seen.put(buffer, np.array([[1]]))
-    assert (buffer[seen.pixel] == 1).all()
+    seen.put(buffer, np.array([[5]]))
+    np.testing.assert_array_equal(buffer, np.where(expected == 999, 999, 5))
+    groups = replace(seen, depth=np.zeros((count, 1)))
+    groups.put(buffer, values[:, None])
+    np.testing.assert_array_equal(buffer, expected)
 
 
 def test_of_groups_only_the_chosen_pixels_are_drawn():
     chosen = np.array([1, 15, 16, 30])
     seen = replace(
-        hits(np.zeros((3, 2))), places=Places(chosen * 2, 1), chosen=chosen, depth=np.zeros((2, 16))
+        hits(np.zeros((3, 2))), places=single_places(chosen * 2), chosen=chosen, depth=np.zeros((2, 16))
     )
     buffer = np.full(64, 99.0)
     seen.put(buffer, np.arange(32).reshape(2, 16))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -32,33 +32,41 @@ class Wanted:
     position: bool = False
 
 
+def _none() -> IntArray:
+    return np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True)
 class Places:
-    """P quilt pixels, in runs of neighbours.
+    """P quilt pixels: runs of neighbours, and single ones behind them.
 
     Attributes:
-        first: (R,) quilt addresses of the first pixels of the runs; R·run = P, in their order.
-        run: 1, or a multiple of RUN.
+        first: (R,) quilt addresses of the first pixels of the runs.
+        run: pixels of a run, a multiple of RUN.
+        single: (S,) quilt addresses of the others; R·run + S = P, in their order.
     """
 
     first: IntArray
     run: int
+    single: IntArray = field(default_factory=_none)
 
     @property
     def pixel(self) -> IntArray:
         """Quilt addresses (P,)."""
-        result: IntArray = (self.first[:, None] + np.arange(self.run)).reshape(-1)
-        return result
+        runs = (self.first[:, None] + np.arange(self.run)).reshape(-1)
+        return np.concatenate((runs, self.single))
 
     def put(self, buffer: NDArray[Any], values: NDArray[Any]) -> None:
         """Write values of the buffer's type, (P,) or (1,) for all, into a flat buffer."""
-        if self.run == 1:
-            buffer[self.first] = values
+        if self.single.size:
+            buffer[self.single] = values if values.size == 1 else values[-self.single.size :]
+        if not self.first.size:
             return
         # As elements of `run` pixels: one write for each run.
         size = buffer.itemsize
         kind = np.dtype((np.void, self.run * size))
-        runs = np.repeat(values, self.run) if values.size == 1 else np.ascontiguousarray(values)
+        count = self.first.size * self.run
+        runs = np.repeat(values, self.run) if values.size == 1 else np.ascontiguousarray(values[:count])
         # Elements that begin at every address take three times as long.
         step = 1 if self._counted is None else RUN
         places = ((buffer.size - self.run) // step + 1,)
@@ -71,6 +79,11 @@ class Places:
         if np.bitwise_or.reduce(self.first) & (RUN - 1):
             return None
         return self.first >> RUN.bit_length() - 1
+
+
+def single_places(address: IntArray) -> Places:
+    """Pixels (P,) anywhere."""
+    return Places(_none(), RUN, address)
 
 
 @dataclass(frozen=True)
@@ -181,7 +194,7 @@ def point_hits(
     towards = np.sign(-(rows[9:12] * position).sum(axis=0))
     normal = (rows[0:3] + weights[0] * rows[3:6] + weights[1] * rows[6:9]) * towards
     return Hits(
-        places=Places(first, 1),
+        places=single_places(first),
         chosen=None,
         facet=facet,
         triangle=triangle,

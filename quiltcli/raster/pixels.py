@@ -28,7 +28,7 @@ def pixel_hits(
         reader: the canvas.
         tiles: n microtiles.
         keys: (G,) keys of the pixels.
-        pixel: (G,) the pixels, counted through all microtiles, ascending.
+        pixel: (G,) the pixels, counted through all microtiles; ascending, if they are all of them.
         places: where they lie in the quilt.
         inside: pixels that are not bleed.
     """

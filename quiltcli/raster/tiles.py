@@ -12,6 +12,7 @@ from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.hits import RUN, Places
 
 _AT_A_TIME = 2048
+_WHOLE_ROW = np.ones(8, dtype=np.bool_).view(np.int64)[0]
 
 
 @dataclass(frozen=True)
@@ -74,11 +75,12 @@ def tiles_at(canvas: Canvas, blocks: Blocks, index: IntArray) -> Tiles:
     )
 
 
-def owned_pixels(blocks: Blocks, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, IntArray, int]:
+def owned_pixels(blocks: Blocks, tiles: Tiles, drawn: BoolArray) -> tuple[IntArray, Places, int]:
     """Those of the `drawn` pixels (n, 64) of microtiles that their facet owns.
 
     Returns:
-        the pixels, counted through all microtiles; their quilt addresses; how many are no bleed.
+        the pixels, counted through all microtiles, whole rows first; where they lie in the quilt; how many
+        are no bleed.
     """
     owned, inside = (
         np.unpackbits(bits.take(tiles.number, axis=0), axis=1).view(np.bool_)
@@ -86,10 +88,13 @@ def owned_pixels(blocks: Blocks, tiles: Tiles, drawn: BoolArray) -> tuple[IntArr
     )
     drawn &= owned
     inside &= drawn
-    pixel = np.flatnonzero(drawn)
-    address = tiles.lines().reshape(-1).take(pixel >> 3)
-    address += pixel & 7
-    return pixel, address, int(np.count_nonzero(inside))
+    rows = drawn.reshape(-1, 8)
+    whole = rows.view(np.int64)[:, 0] == _WHOLE_ROW
+    row, single = np.flatnonzero(whole), np.flatnonzero(rows & ~whole[:, None])
+    lines = tiles.lines().reshape(-1)
+    places = Places(lines.take(row), RUN, lines.take(single >> 3) + (single & 7))
+    pixel = np.concatenate(((8 * row[:, None] + np.arange(8)).reshape(-1), single))
+    return pixel, places, int(np.count_nonzero(inside))
 
 
 def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: IntArray) -> Iterator[Places]:
@@ -110,8 +115,7 @@ def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: IntArray) -> Iterator[
         yield tiles[part].places()
     for part in in_parts(np.flatnonzero(~empty), _AT_A_TIME):
         some = tiles[part]
-        _, address, _ = owned_pixels(blocks, some, canvas.keys.take(some.index, axis=0) == 0)
-        yield Places(address, 1)
+        yield owned_pixels(blocks, some, canvas.keys.take(some.index, axis=0) == 0)[1]
 
 
 def in_parts(rows: IntArray, step: int) -> Iterator[IntArray]:

@@ -14,7 +14,7 @@ import numpy as np
 from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
-from quiltcli.raster.hits import Hits, Places, Wanted
+from quiltcli.raster.hits import Hits, Wanted
 from quiltcli.raster.keys import serial_of
 from quiltcli.raster.pixels import pixel_hits
 from quiltcli.raster.planes import PlaneTable
@@ -146,6 +146,6 @@ def _complete_tiles(reader: Reader, tiles: Tiles) -> Hits:
 def _scattered_pixels(reader: Reader, tiles: Tiles) -> Hits:
     """Hits of those pixels of microtiles that see something and that their facet owns."""
     keys = reader.canvas.keys.take(tiles.index, axis=0)
-    pixel, address, inside = owned_pixels(reader.blocks, tiles, keys != 0)
+    pixel, places, inside = owned_pixels(reader.blocks, tiles, keys != 0)
     keys = keys.reshape(-1).take(pixel)
-    return pixel_hits(reader, tiles, keys, pixel, Places(address, 1), inside)
+    return pixel_hits(reader, tiles, keys, pixel, places, inside)

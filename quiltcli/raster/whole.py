@@ -113,8 +113,8 @@ class WholeTiles:
         """Where the pixels lie that are drawn; which these are; how many are no bleed."""
         if self.border is None:
             return self.tiles.places(self.side), None, shape[0] * shape[1]
-        pixel, address, inside = owned_pixels(self.border, self.tiles, np.ones(shape, dtype=np.bool_))
-        return Places(address, 1), pixel, inside
+        pixel, places, inside = owned_pixels(self.border, self.tiles, np.ones(shape, dtype=np.bool_))
+        return places, pixel, inside
 
 
 class TileShader(Protocol):
