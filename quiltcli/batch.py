@@ -55,14 +55,14 @@ def draw_batch(
         wanted = replace(wanted, position=True)
     visible, first = 0, stage.blocks.tiles(batch).start
     drawing = draw(frame, batch)
-    if stale.any():
-        empty_missed(stage, drawing, np.flatnonzero(stale) + first, buffers)
     shader = NodeShader(stage.scene, frame.viewer.eye) if "rgba" in channels else None
     for hits in drawing.hits(wanted, shader):
         fill(buffers, channels, stage.scene, frame.viewer, hits)
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)
         visible += hits.inside
+    if stale.any():  # now that is known which microtiles have no pixel to be emptied
+        empty_missed(stage, drawing, np.flatnonzero(stale) + first, buffers)
     tiles = np.full(stale.size, not mends_itself(stage))
     tiles[drawing.drawn() - first] = True
     drawing.done()

@@ -17,6 +17,7 @@ from quiltcli import batch, binframe, binning, blank, raster
 from quiltcli.blank import new_buffers
 from quiltcli.display import Facets
 from quiltcli.draw import draw_frame
+from quiltcli.raster import tiles
 from quiltcli.scene import Scene
 from quiltcli.stage import Stage
 
@@ -173,6 +174,17 @@ def test_only_what_was_drawn_is_emptied_where_something_is_drawn_again():
         draw_frame(stage, EYE, buffers, dirty=dirty)
     np.testing.assert_array_equal(np.concatenate(asked), np.flatnonzero(dirty))
     assert dirty.sum() < 0.5 * dirty.size
+
+
+def test_microtiles_all_of_whose_pixels_see_something_are_not_searched_for_bare_ones():
+    stage = stage_of_facets(ball_display(1), ball_scene(5, radius=40))  # the eye is inside of it
+    buffers, dirty = new_buffers(stage), np.zeros(stage.blocks.used.size, bool)
+    draw_frame(stage, EYE, buffers, dirty=dirty)
+    probe = {(tiles, "owned_pixels"): lambda _, blocks, some, drawn: {"searched": some.index.size}}
+    with counted(probe) as counts:
+        draw_frame(stage, EYE, buffers, dirty=dirty)
+    assert dirty.sum() > 1000
+    assert counts["searched"] <= np.count_nonzero(dirty & ~stage.blocks.interior)
 
 
 def test_culled_triangles_are_neither_binned_nor_drawn():

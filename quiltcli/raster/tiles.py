@@ -106,9 +106,14 @@ def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: IntArray) -> Iterator[
         wanted: those asked about among the microtiles of all blocks, ascending; others than the canvas's
             are passed over.
     """
-    asked = np.searchsorted(canvas.number, wanted)
-    asked = asked[np.append(canvas.number, -1).take(asked) == wanted]
-    bare = asked[(canvas.used & (canvas.filler == 0) & ~canvas.full).take(asked)]
+    if not canvas.number.size:
+        return
+    first, last = canvas.number[0], canvas.number[-1]
+    asked = np.zeros(last - first + 1, dtype=np.bool_)
+    asked[wanted[slice(*np.searchsorted(wanted, (first, last + 1)))] - first] = True
+    bare = np.flatnonzero(
+        canvas.used & (canvas.filler == 0) & ~canvas.full & asked.take(canvas.number - first)
+    )
     tiles = tiles_at(canvas, blocks, bare)
     empty = tiles.interior & ~canvas.touched[bare]
     for part in in_parts(np.flatnonzero(empty), _AT_A_TIME):

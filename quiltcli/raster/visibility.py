@@ -118,7 +118,7 @@ def _squares(canvas: Canvas, tiles: Tiles, serial: IntArray, whole: IntArray) ->
 
 
 def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
-    """How the microtiles (n,) are to be read.
+    """How the microtiles (n,) are to be read; those all of whose pixels see something are noted down as full.
 
     Returns:
         the serial of the pair that fills a microtile, −1 where pixels have to be looked at; and among
@@ -130,6 +130,7 @@ def _sort_out(reader: Reader, tiles: Tiles) -> tuple[IntArray, BoolArray]:
     keys = canvas.keys.take(tiles.index[keyed], axis=0)
     full = np.flatnonzero(keys.min(axis=1) > 0)
     keyed, keys = keyed[full], keys[full]
+    canvas.full[tiles.index[keyed]] = True
     one = np.bitwise_or.reduce(keys ^ keys[:, :1], axis=1) & np.int64((1 << bits) - 1) == 0
     serial[keyed[one]] = serial_of(keys[one, 0], bits)
     complete = np.zeros(serial.size, dtype=np.bool_)
