@@ -47,6 +47,10 @@ class Clock:
 class Crew(Protocol):
     """Whoever does the work of a frame that can be divided."""
 
+    @property
+    def workers(self) -> int:
+        """How many they are."""
+
     def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
         """Bin the scene."""
 
@@ -64,7 +68,7 @@ class Threads:
     """A crew of threads of this process."""
 
     stage: Stage
-    threads: int
+    workers: int
 
     def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
         """Bin the scene, in one thread."""
@@ -82,9 +86,9 @@ class Threads:
         def drawn(batch: tuple[int, int]) -> Drawn:
             return draw_batch(self.stage, frame, batch, buffers, stale[self.stage.blocks.tiles(batch)])
 
-        if self.threads == 1:
+        if self.workers == 1:
             return list(map(drawn, work))
-        with ThreadPoolExecutor(self.threads) as pool:
+        with ThreadPoolExecutor(self.workers) as pool:
             return list(pool.map(drawn, work))
 
 
@@ -134,7 +138,7 @@ def draw_frame(
     with clock.stage("rasterize and shade"):
         if has_background(stage):
             written |= rays.lit[stage.blocks.facet]
-        work = batches(frame, written)
+        work = batches(frame, written, crew.workers)
         drawn = crew.draw(frame, work, buffers, stale)
         visible = sum(batch.visible for batch in drawn)
         if dirty is not None:

@@ -193,6 +193,11 @@ class Pool:
             theirs.close()
             self._workers.append(_Worker(process, ours))
 
+    @property
+    def workers(self) -> int:
+        """How many they are."""
+        return len(self._workers)
+
     def __enter__(self) -> Pool:
         return self
 

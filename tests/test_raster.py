@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 import pytest
 from rig import cube, display, icosphere, panel, picture, pixel_rays, viewer
@@ -228,6 +230,31 @@ def test_blocks_do_not_show(monkeypatch):
     np.testing.assert_array_equal(pieces.triangle, whole.triangle)
     # Planes of 1/t are rounded to 2⁻⁵⁰ of their greatest value in a block, over 512 pixels at most.
     np.testing.assert_allclose(pieces.depth, whole.depth, rtol=2.0**-38)
+
+
+def test_workers_get_several_batches_each_and_none_shows(monkeypatch):
+    monkeypatch.setattr(raster_blocks, "SIDE", 64)
+    monkeypatch.setattr("quiltcli.raster.prewarp.SIDE", 64)
+    monkeypatch.setattr(raster_blocks, "BATCH_PIXELS", 20_000)
+    monkeypatch.setattr(raster_blocks, "_LEAST_PIXELS", 5000)
+    shown = picture(cube(60), *random_scene(6), viewer((2.2, 1.8, 3.2)))
+    blocks, seen = shown.frame.blocks, np.flatnonzero(shown.frame.pairs.per_block)
+    pixels = 64 * np.add.reduceat(blocks.used.astype(int), blocks.tile_start[:-1])
+    pixels[shown.frame.pairs.per_block == 0] = 0
+    counts = []
+    for workers in (1, 2, 3, 50):
+        work = raster.batches(shown.frame, workers=workers)
+        counts.append(len(work))
+        held = np.concatenate([np.arange(*batch) for batch in work])
+        assert np.isin(seen, held).all()
+        assert (np.diff(held) > 0).all()
+        assert max(pixels[slice(*batch)].sum() for batch in work) <= 20_000
+        triangle = np.full(shown.owners.size, -1)
+        for hits in chain.from_iterable(raster.rasterize(shown.frame, batch) for batch in work):
+            hits.put(triangle, hits.triangle[:, None])
+        np.testing.assert_array_equal(triangle, shown.triangle)
+    assert counts[0] < counts[1] <= counts[2] <= counts[3]
+    assert counts[1] >= 6
 
 
 def test_bleed_continues_the_picture_past_the_edge():

@@ -89,15 +89,16 @@ class Frame:
     order: DepthOrder | None = None
 
 
-def batches(frame: Frame, wanted: BoolArray | None = None) -> list[tuple[int, int]]:
+def batches(frame: Frame, wanted: BoolArray | None = None, workers: int = 1) -> list[tuple[int, int]]:
     """The frame's work in ranges of blocks; any may be rasterized anywhere, in any order.
 
     Args:
         frame: the frame.
         wanted: (B,) the blocks that the ranges must hold; by default those that have pairs.
+        workers: how many will share them.
     """
     counts = frame.pairs.per_block
-    return cut_batches(counts, frame.blocks, counts > 0 if wanted is None else wanted)
+    return cut_batches(counts, frame.blocks, counts > 0 if wanted is None else wanted, workers)
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,10 @@ from quiltcli.layout import Layout, quilt_polygons
 T = TypeVar("T", bound=np.generic)
 
 SIDE = 512
-BATCH_PIXELS = 1 << 20
+BATCH_PIXELS = 1 << 21
 BATCH_PAIRS = 1 << 17
+_LEAST_PIXELS = 1 << 20
+_SHARES = 3  # of a worker, if they do not get too small, so that none waits long for the last
 _NOT_SEEN = np.float64(np.inf).view(np.int64)
 """A key that nothing lies in front of."""
 
@@ -177,25 +179,31 @@ def _tile_bits(mask: BoolArray) -> NDArray[np.uint8]:
     return rows.reshape(len(mask) // 8, 8, -1).transpose(0, 2, 1).reshape(-1, 8)
 
 
-def cut_batches(pair_counts: IntArray, blocks: Blocks, wanted: BoolArray) -> list[tuple[int, int]]:
+def cut_batches(
+    pair_counts: IntArray, blocks: Blocks, wanted: BoolArray, workers: int
+) -> list[tuple[int, int]]:
     """Group consecutive blocks into batches of bounded work.
 
     Args:
         pair_counts: (B,) block pairs of each block.
         blocks: the blocks.
         wanted: (B,) the blocks that must be in a batch; others cost nothing.
+        workers: how many will share the batches. No pixel depends on which batch it is in.
 
     Returns:
-        Ranges [first, last) of blocks; what they hold does not depend on the number of workers. Their pixels
-        are counted by microtiles that are drawn: the rectangle of a triangular facet is half empty.
+        Ranges [first, last) of blocks. Their pixels are counted by microtiles that are drawn: the rectangle
+        of a triangular facet is half empty.
     """
     used = np.concatenate(([0], np.cumsum(blocks.used)))
-    area = (64 * np.diff(used.take(blocks.tile_start))).tolist()
-    counts = pair_counts.tolist()
+    areas = 64 * np.diff(used.take(blocks.tile_start))
+    most = BATCH_PIXELS
+    if workers > 1:
+        most = min(most, max(_LEAST_PIXELS, int(areas[wanted].sum()) // (_SHARES * workers)))
+    area, counts = areas.tolist(), pair_counts.tolist()
     batches = []
     first, begun, pixels, pairs = 0, False, 0, 0
     for block in np.flatnonzero(wanted).tolist():
-        if begun and (pixels + area[block] > BATCH_PIXELS or pairs + counts[block] > BATCH_PAIRS):
+        if begun and (pixels + area[block] > most or pairs + counts[block] > BATCH_PAIRS):
             batches.append((first, block))
             first, pixels, pairs = block, 0, 0
         begun = True
