@@ -40,6 +40,16 @@ def serial_of(keys: IntArray, bits: int) -> IntArray:
     return result
 
 
+def distinct(serial: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """The distinct serials, ascending, among many below `count`, and the place of each among them."""
+    there = np.zeros(count, dtype=np.bool_)
+    there[serial] = True
+    found = np.flatnonzero(there)
+    place = np.empty(count, dtype=np.int64)
+    place[found] = np.arange(found.size)
+    return found, place.take(serial)
+
+
 def depth_part(keys: IntArray, bits: int) -> FloatArray:
     """The least 1/t that keys may stand for; 0 for the key 0, and no key is negative."""
     result: FloatArray = (keys & ~np.int64((1 << bits) - 1)).view(np.float64)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.raster.hits import Hits, Places
-from quiltcli.raster.keys import serial_of
+from quiltcli.raster.keys import distinct, serial_of
 from quiltcli.raster.planes import Planes
 from quiltcli.raster.reader import Reader, rays_through
 from quiltcli.raster.surfaces import surfaces
@@ -33,7 +33,7 @@ def pixel_hits(
         inside: pixels that are not bleed.
     """
     planes, wanted = reader.table.planes, reader.wanted
-    serial, which = _distinct(serial_of(keys, reader.bits), reader.table.row_of_serial.size)
+    serial, which = distinct(serial_of(keys, reader.bits), reader.table.row_of_serial.size)
     rows = reader.table.row_of_serial.take(serial)
     x0, y0 = (planes.box[k].take(rows) for k in (0, 2))
     seen = surfaces(planes, rows, wanted, reader.limits.handed, x0, y0)
@@ -128,13 +128,3 @@ def _plane_values(rows: NDArray[Any], x: NDArray[Any], y: NDArray[Any], result: 
     result += rows[:, 1] * y
     result += rows[:, 2]
     return result
-
-
-def _distinct(values: IntArray, count: int) -> tuple[IntArray, IntArray]:
-    """The distinct numbers among `values`, all below `count`, and the place of each value among them."""
-    there = np.zeros(count, dtype=np.bool_)
-    there[values] = True
-    distinct = np.flatnonzero(there)
-    place = np.empty(count, dtype=np.int64)
-    place[distinct] = np.arange(distinct.size)
-    return distinct, place.take(values)

@@ -15,7 +15,7 @@ from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.raster.blocks import Blocks, Canvas
 from quiltcli.raster.depth import DepthRange
 from quiltcli.raster.hits import Hits, Wanted
-from quiltcli.raster.keys import serial_of
+from quiltcli.raster.keys import distinct, serial_of
 from quiltcli.raster.pixels import pixel_hits
 from quiltcli.raster.planes import PlaneTable
 from quiltcli.raster.reader import Reader
@@ -23,7 +23,7 @@ from quiltcli.raster.surfaces import has_one_normal
 from quiltcli.raster.tiles import Tiles, in_parts, owned_pixels, tiles_at
 from quiltcli.raster.whole import TileShader, shaded_hits, tile_hits, whole_tiles
 
-_WHOLE, _PIXELS = 4096, 512  # squares, or microtiles, at a time
+_WHOLE, _PIXELS = 8192, 1024  # squares, or microtiles, at a time
 SQUARE = 4
 """Microtiles from side to side of the squares that are looked for: a power of two."""
 
@@ -54,10 +54,11 @@ def read_canvas(
     reader = Reader(canvas, table, blocks, limits, bits, wanted)
     serial, complete = _sort_out(reader, tiles)
     whole = np.flatnonzero(serial >= 0)
-    triangle = table.planes.triangle.take(table.row_of_serial.take(serial[whole]))
     is_even = np.zeros(whole.size, dtype=np.bool_)
     if wanted.normals is not None:
-        is_even = has_one_normal(wanted.normals, triangle)
+        filling, which = distinct(serial[whole], table.row_of_serial.size)
+        triangle = table.planes.triangle.take(table.row_of_serial.take(filling))
+        is_even = has_one_normal(wanted.normals, triangle).take(which)
     border = ~tiles.interior[whole]
     alone = np.ones(whole.size, dtype=np.bool_)
     if shader is not None:
