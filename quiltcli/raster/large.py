@@ -70,6 +70,10 @@ class Spans:
     least: FloatArray
     greatest: FloatArray
 
+    def __getitem__(self, part: slice) -> Spans:
+        """A range of the combinations, as views."""
+        return Spans(*(column[part] for column in vars(self).values()))
+
     def take(self, keep: IntArray) -> Spans:
         """The combinations with these indices."""
         return Spans(*(column.take(keep) for column in vars(self).values()))
@@ -335,8 +339,7 @@ def _draw_rounds(
     bounds = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
     for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
         for at in range(first, last, _ROUND):
-            part = np.arange(at, min(at + _ROUND, last))
-            few = spans.take(part)
+            few = spans[at : min(at + _ROUND, last)]
             keys = canvas.keys.take(few.tile, axis=0)
             canvas.keys[few.tile] = np.maximum(keys, _tile_keys(planes, few, limits, bits, by), out=keys)
 
@@ -375,7 +378,7 @@ def _tile_keys(
     def values(plane: FloatArray) -> FloatArray:
         # Exact whatever the order of the sums: the planes lie on dyadic grids.
         local = moved(np.take(plane, row, axis=1), x, y)
-        result: FloatArray = local.T.copy() @ BASIS
+        result: FloatArray = local.T @ BASIS
         return result
 
     inverse = values(planes.inverse)
