@@ -127,6 +127,7 @@ def _machine() -> dict[str, str]:
     """What ratios hold for, and what was missing."""
     renderer = opengl.renderer()
     found = {
+        "processor": _processor(),
         "cores": str(len(os.sched_getaffinity(0))),
         "Python": platform.python_version(),
         **{name: version(name) for name in ("numpy", "embreex", "OpenEXR")},
@@ -140,6 +141,16 @@ def _machine() -> dict[str, str]:
     for name, value in found.items():
         click.echo(f"{name}: {value}", err=True)
     return found
+
+
+def _processor() -> str:
+    """The processor's name, family and model: caches and instructions differ, and ratios with them."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    told = dict(map(str.strip, line.split(":", 1)) for line in reversed(lines) if ":" in line)
+    if "model name" not in told:
+        return platform.processor() or platform.machine()
+    return f"{told['model name']} (family {told.get('cpu family', '?')}, model {told.get('model', '?')})"
 
 
 def _commit() -> str:
