@@ -8,7 +8,7 @@ import numpy as np
 
 from quiltcli.blank import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.channels import fill, wanted_for
-from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.geometry import BoolArray
 from quiltcli.orders import DepthOrder, depth_order
 from quiltcli.raster import Drawing, Frame, Hits, draw, rasterize
 from quiltcli.shading import MOST_HALF, shading_wants
@@ -61,18 +61,18 @@ def draw_batch(
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)
         visible += hits.inside
-    if stale.any():  # now that is known which microtiles have no pixel to be emptied
-        empty_missed(stage, drawing, np.flatnonzero(stale) + first, buffers)
+    if stale.any():
+        empty_missed(stage, drawing, stale, first, buffers)
     tiles = np.full(stale.size, not mends_itself(stage))
     tiles[drawing.drawn() - first] = True
     drawing.done()
     return Drawn(visible, tiles)
 
 
-def empty_missed(stage: Stage, drawing: Drawing, tiles: IntArray, buffers: Buffers) -> None:
-    """Empty the pixels of these microtiles at which the drawing shows nothing."""
+def empty_missed(stage: Stage, drawing: Drawing, stale: BoolArray, first: int, buffers: Buffers) -> None:
+    """Empty the pixels at which the drawing shows nothing, in microtiles as `Drawing.missed` is told them."""
     empty = {name: np.full(1, value, buffers[name].dtype) for name, value in empty_values(stage).items()}
-    for places in drawing.missed(tiles):
+    for places in drawing.missed(stale, first):
         for name, value in empty.items():
             places.put(buffers[name], value)
 

@@ -169,7 +169,11 @@ def test_only_what_was_drawn_is_emptied_where_something_is_drawn_again():
     buffers, dirty = new_buffers(stage), np.zeros(stage.blocks.used.size, bool)
     draw_frame(stage, EYE, buffers, dirty=dirty)
     asked = []
-    probe = {(batch, "empty_missed"): lambda _, stage, drawing, tiles, buffers: asked.append(tiles) or {}}
+    probe = {
+        (batch, "empty_missed"): lambda _, stage, drawing, stale, first, buffers: (
+            asked.append(np.flatnonzero(stale) + first) or {}
+        )
+    }
     with counted(probe):
         draw_frame(stage, EYE, buffers, dirty=dirty)
     np.testing.assert_array_equal(np.concatenate(asked), np.flatnonzero(dirty))

@@ -303,8 +303,8 @@ def test_hits_and_missed_pixels_are_all_that_the_facets_own():
         count = np.zeros(shown.owners.size, int)
         for batch in raster.batches(shown.frame):
             drawing = raster.draw(shown.frame, batch)
-            tiles = np.arange(shown.frame.blocks.used.size)
-            for part in (*(h.places for h in drawing.hits(raster.Wanted())), *drawing.missed(tiles)):
+            tiles = np.ones(shown.frame.blocks.used.size, bool)
+            for part in (*(h.places for h in drawing.hits(raster.Wanted())), *drawing.missed(tiles, 0)):
                 np.add.at(count, part.pixel, 1)
         facet = shown.frame.blocks.facet[shown.frame.pairs.per_block > 0]
         np.testing.assert_array_equal(count, np.isin(np.abs(shown.owners), facet + 1))

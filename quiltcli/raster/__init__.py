@@ -123,9 +123,16 @@ class Drawing:
         """What the pixels see, each of the batch at most once; whole microtiles with their colours."""
         return read_canvas(self.canvas, self.table, self.blocks, self.limits, self.bits, wanted, shader)
 
-    def missed(self, tiles: IntArray) -> Iterator[Places]:
-        """The pixels of facets that see nothing, in those of these microtiles whose blocks have pairs."""
-        return missed_pixels(self.canvas, self.blocks, tiles)
+    def missed(self, wanted: BoolArray, first: int) -> Iterator[Places]:
+        """The pixels of facets that see nothing, in microtiles whose blocks have pairs.
+
+        Reading `hits` finds microtiles that have none: asked afterwards, there is less to look through.
+
+        Args:
+            wanted: (m,) the microtiles that are asked about, of the batch's blocks.
+            first: the index of the first of these among those of all blocks.
+        """
+        return missed_pixels(self.canvas, self.blocks, wanted, first)
 
     def drawn(self) -> IntArray:
         """The microtiles of which pixels see something."""

@@ -97,23 +97,17 @@ def owned_pixels(blocks: Blocks, tiles: Tiles, drawn: BoolArray) -> tuple[IntArr
     return pixel, places, int(np.count_nonzero(inside))
 
 
-def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: IntArray) -> Iterator[Places]:
+def missed_pixels(canvas: Canvas, blocks: Blocks, wanted: BoolArray, first: int) -> Iterator[Places]:
     """The pixels of facets at which nothing was drawn.
 
     Args:
         canvas: what was drawn.
         blocks: the blocks.
-        wanted: those asked about among the microtiles of all blocks, ascending; others than the canvas's
-            are passed over.
+        wanted: (m,) the microtiles asked about, among so many of all blocks that the canvas's are all there.
+        first: the index of the first of these.
     """
-    if not canvas.number.size:
-        return
-    first, last = canvas.number[0], canvas.number[-1]
-    asked = np.zeros(last - first + 1, dtype=np.bool_)
-    asked[wanted[slice(*np.searchsorted(wanted, (first, last + 1)))] - first] = True
-    bare = np.flatnonzero(
-        canvas.used & (canvas.filler == 0) & ~canvas.full & asked.take(canvas.number - first)
-    )
+    asked = wanted.take(canvas.number - first)
+    bare = np.flatnonzero(asked & canvas.used & (canvas.filler == 0) & ~canvas.full)
     tiles = tiles_at(canvas, blocks, bare)
     empty = tiles.interior & ~canvas.touched[bare]
     for part in in_parts(np.flatnonzero(empty), _AT_A_TIME):
