@@ -1,6 +1,6 @@
 """quilt: a batch renderer for multiplanar displays.
 
-The program reads in one direction, and so does the code: see `quiltcli.render` for the walk
+The program reads in one direction, and so does the code: see `quiltcli.render.sequence` for the walk
 from a job to its images.
 """
 

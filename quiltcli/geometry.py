@@ -7,7 +7,7 @@ coordinates, x to the right and y down, the first pixel's centre at (0.5, 0.5).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -90,6 +90,12 @@ def gather_corners(vertices: FloatArray, triangles: Int32Array) -> FloatArray:
     """Corners (3, 3, N) [corner, axis] of `triangles` (N, 3), contiguous along N."""
     rows = vertices.take(triangles.T.ravel(), axis=0).reshape(3, -1, 3)
     return np.ascontiguousarray(rows.transpose(0, 2, 1))
+
+
+def slices(first: int, last: int, step: int) -> Iterator[slice]:
+    """Consecutive slices of at most `step` from `first` to `last`."""
+    for at in range(first, last, step):
+        yield slice(at, min(at + step, last))
 
 
 def segments(start: IntArray) -> tuple[IntArray, IntArray]:

@@ -17,7 +17,7 @@ from quiltcli.cli.printing import ROWS, print_aligned, print_rows
 @click.argument("files", nargs=-1, required=True, type=PATH)
 def check(files: tuple[Path, ...]) -> None:
     """Read FILES strictly and report every problem found."""
-    from quiltcli.checking import check_files
+    from quiltcli.analysis.check import check_files
 
     problems = check_files(files)
     for problem in problems:
@@ -33,7 +33,7 @@ def check(files: tuple[Path, ...]) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Everything, for programs.")
 def info(file: Path, every: bool, as_json: bool) -> None:
     """Say what FILE is: a display, layout, scene, job, mesh or EXR image."""
-    from quiltcli.info import describe
+    from quiltcli.analysis.info import describe
 
     found = describe(file)
     if as_json:
@@ -67,8 +67,8 @@ def diff(a: Path, b: Path, **limits: Any) -> None:
 
     Exit codes are idiff's: 0 match, 1 warning, 2 failure, 3 size, 4 file error.
     """
-    from quiltcli.diff import COLUMNS, Limits, diff_rows
-    from quiltcli.diff import diff as compare
+    from quiltcli.images.diff import COLUMNS, Limits, diff_rows
+    from quiltcli.images.diff import diff as compare
 
     result = compare(a, b, Limits(**{name: value for name, value in limits.items() if value is not None}))
     print_rows(COLUMNS, diff_rows(result))

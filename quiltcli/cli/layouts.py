@@ -58,8 +58,8 @@ def pack(
     from quiltcli.display import load_display
     from quiltcli.job import load_display_file
     from quiltcli.layout import fill, layout_picture, read_layout, write_layout
-    from quiltcli.packing import DEFAULT_METHOD, DEFAULT_SECONDS
-    from quiltcli.packing import pack as pack_facets
+    from quiltcli.layout.packing import DEFAULT_METHOD, DEFAULT_SECONDS
+    from quiltcli.layout.packing import pack as pack_facets
 
     facets = load_display(load_display_file(display))
     layout = pack_facets(
@@ -90,8 +90,8 @@ def export(layout: Path, output: Path, format_name: str | None, display: Path | 
     Textured mesh (.obj), table of panels (.csv), JSON (.json), MPCDI (.mpcdi), ST maps (.exr), or a
     template picture (.png, .svg).
     """
+    from quiltcli.exchange.pixelmaps import known_display, write_map
     from quiltcli.layout import read_layout
-    from quiltcli.pixelmaps import known_display, write_map
 
     loaded = read_layout(layout)
     written = write_map(loaded, known_display(loaded, display), output, format_name)
@@ -118,9 +118,9 @@ def import_(
 ) -> None:
     """Make a layout from a pixel map: .obj, .csv, .json or .mpcdi."""
     from quiltcli.display import load_display
+    from quiltcli.exchange.pixelmaps import read_map
     from quiltcli.job import load_display_file
     from quiltcli.layout import layout_picture, write_layout
-    from quiltcli.pixelmaps import read_map
 
     facets = load_display(load_display_file(display)) if display is not None else None
     layout = read_map(file, facets, size=size, format_name=format_name)
@@ -156,10 +156,10 @@ def pattern(
     overwrite: bool,
 ) -> None:
     """Draw test patterns for LAYOUT at exact pixels: which facet, which way up, where it ends."""
+    from quiltcli.calibration.pattern import KINDS
+    from quiltcli.calibration.pattern_files import write_patterns
+    from quiltcli.exchange.pixelmaps import known_display
     from quiltcli.layout import align, read_layout
-    from quiltcli.pattern import KINDS
-    from quiltcli.patternfiles import write_patterns
-    from quiltcli.pixelmaps import known_display
 
     loaded = read_layout(layout)
     facets = known_display(loaded, display)

@@ -52,9 +52,9 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
     From the viewer's eye the picture is compared with a direct one of the scene; the figures go to
     stdout. The images are those that a render has left; where there are none they are drawn in memory.
     """
+    from quiltcli.analysis.simulate import PictureOptions
+    from quiltcli.analysis.simulate.files import Pictures, write_pictures
     from quiltcli.job import load_job
-    from quiltcli.simulate import PictureOptions
-    from quiltcli.simulate.files import Pictures, write_pictures
 
     wanted = ("direct", "heat_map", "view", "exposure", "video")
     pictures = Pictures(how.pop("output"), **{name: how.pop(name) for name in wanted})
@@ -92,9 +92,9 @@ def compare(
 
     Writes a page with figures, charts and close views, and the same as JSON; a table goes to stdout.
     """
-    from quiltcli.compare import COLUMNS, CompareOptions, study_rows, study_words, variants_of
-    from quiltcli.compare import compare as compare_methods
-    from quiltcli.compare.page import write_comparison
+    from quiltcli.analysis.methods import COLUMNS, CompareOptions, study_rows, study_words, variants_of
+    from quiltcli.analysis.methods import compare as compare_methods
+    from quiltcli.analysis.methods.page import write_comparison
     from quiltcli.job import load_job
 
     loaded = load_job(job, sets)
@@ -144,8 +144,8 @@ def view(out: Path, frames: tuple[int, ...] | None, output: Path | None, **how: 
     The page is one file that opens in any browser and needs no network: the display with its images on,
     from the viewer's eye and from everywhere else, with the scene as a ghost of at most so many triangles.
     """
-    from quiltcli.view import ViewOptions
-    from quiltcli.view import view as write_view
+    from quiltcli.exchange.web import ViewOptions
+    from quiltcli.exchange.web import view as write_view
 
     options = ViewOptions(nearest=how.pop("filter") == "nearest", **how)
     for label, text in write_view(out, frames, output, options).lines:
@@ -178,8 +178,8 @@ def preview(
     Pictures of 8 bits are to look at, at most 2048 pixels wide and high; those of 16 bits are to be
     shown, every pixel of them.
     """
-    from quiltcli.preview import LARGEST, Look, preview_paths
-    from quiltcli.preview import preview as write_preview
+    from quiltcli.images.preview import LARGEST, Look, preview_paths
+    from quiltcli.images.preview import preview as write_preview
 
     if largest is None:
         largest = LARGEST if depth == "8" else 0
@@ -201,9 +201,9 @@ def preview(
 @click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
 def contact(out: Path, output: Path, view: str, exposure: float, **how: Any) -> None:
     """Lay the images in the output folder OUT of a render side by side, small, with their names."""
-    from quiltcli.contact import Sheet, contact_sheet
-    from quiltcli.preview import Look
-    from quiltcli.wholefile import make_folder
+    from quiltcli.formats.whole import make_folder
+    from quiltcli.images.contact import Sheet, contact_sheet
+    from quiltcli.images.preview import Look
 
     make_folder(output.parent)
     count, (width, height) = contact_sheet(out, output, Sheet(look=Look(view, exposure), **how))
@@ -246,8 +246,8 @@ def sweetspot(
     For every place on the floor: the angle by which things are seen beside their right places, as mean,
     95 % and worst over the facets; and the room there is under a limit.
     """
-    from quiltcli.sweetspot import ask, sweet_spot
-    from quiltcli.sweetspot.picture import check_picture, sweet_spot_picture
+    from quiltcli.analysis.sweetspot import ask, sweet_spot
+    from quiltcli.analysis.sweetspot.picture import check_picture, sweet_spot_picture
 
     as_json = how.pop("as_json")
     if picture is not None:
@@ -261,7 +261,7 @@ def sweetspot(
 
 def _print_sweet_spot(spot: Any, as_json: bool) -> None:
     """The answer as data, or in words and tables."""
-    from quiltcli.sweetspot import report
+    from quiltcli.analysis.sweetspot import report
 
     if as_json:
         import json

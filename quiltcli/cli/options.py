@@ -31,13 +31,13 @@ class Parsed(click.ParamType):  # type: ignore[type-arg] # generic only in some 
 
 
 def _frames(text: str) -> tuple[int, ...]:
-    from quiltcli.frames import parse_frames
+    from quiltcli.job.frames import parse_frames
 
     return parse_frames(text)
 
 
 def _facets(text: str) -> tuple[int, ...]:
-    from quiltcli.frames import parse_facets
+    from quiltcli.job.frames import parse_facets
 
     return parse_facets(text)
 
@@ -46,7 +46,7 @@ def _size(text: str) -> tuple[int, int] | None:
     if text == "auto":
         return None
     if text.isalnum() and not text[0].isdigit():
-        from quiltcli.packing import CANVASES
+        from quiltcli.layout.packing import CANVASES
 
         if text in CANVASES:
             return CANVASES[text]
@@ -57,7 +57,7 @@ def _size(text: str) -> tuple[int, int] | None:
 
 
 def _aspect(text: str) -> Any:
-    from quiltcli.packing import read_aspect
+    from quiltcli.layout.packing import read_aspect
 
     return read_aspect(text)
 

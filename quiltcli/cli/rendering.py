@@ -42,7 +42,7 @@ def render(
 ) -> None:
     """Render the frames of JOB: quilts, facet images, report."""
     from quiltcli.job import load_job
-    from quiltcli.render import RenderOptions
+    from quiltcli.render.sequence import RenderOptions
 
     if resume and overwrite:
         raise click.UsageError("--resume keeps finished frames and --overwrite replaces them: give one")
@@ -54,12 +54,12 @@ def render(
 
 def _render(job: Any, options: Any, scheduler: str | None) -> Any:
     """Render here or on a farm, with progress on stderr and the summary on stdout."""
-    from quiltcli.farm import render_on
-    from quiltcli.interrupt import Stopped
-    from quiltcli.progress import progress
-    from quiltcli.render import Listener
-    from quiltcli.render import render as render_here
-    from quiltcli.report import summary_warnings
+    from quiltcli.cli.progress import progress
+    from quiltcli.render.farm import render_on
+    from quiltcli.render.interrupt import Stopped
+    from quiltcli.render.report import summary_warnings
+    from quiltcli.render.sequence import Listener
+    from quiltcli.render.sequence import render as render_here
 
     def work(*given: Any) -> Any:
         return render_here(*given) if scheduler is None else render_on(scheduler, *given)
@@ -84,7 +84,7 @@ def _render(job: Any, options: Any, scheduler: str | None) -> Any:
 
 def _print_profile(records: Any) -> None:
     """Where the time of the run went."""
-    from quiltcli.report import PROFILE_COLUMNS, profile_rows
+    from quiltcli.render.report import PROFILE_COLUMNS, profile_rows
 
     click.echo()
     print_aligned(PROFILE_COLUMNS, profile_rows(records))
@@ -94,7 +94,7 @@ def _print_summary(records: Any) -> None:
     """The summary table, plain where stdout is no terminal."""
     from rich.console import Console
 
-    from quiltcli.report import summary, summary_table
+    from quiltcli.render.report import summary, summary_table
 
     if sys.stdout.isatty():
         Console().print(summary_table(records))
@@ -129,10 +129,10 @@ def verify(
     sets: tuple[str, ...],
 ) -> None:
     """Hold a frame of JOB against ray casts, pixel by pixel; exit 1 if a tolerance is missed."""
+    from quiltcli.analysis.verify import SAMPLE, VerifyOptions
+    from quiltcli.analysis.verify import verify as verify_frame
+    from quiltcli.analysis.verify.picture import write_picture
     from quiltcli.job import load_job
-    from quiltcli.verify import SAMPLE, VerifyOptions
-    from quiltcli.verify import verify as verify_frame
-    from quiltcli.verify.picture import write_picture
 
     options = VerifyOptions(frame, everything, pixels or SAMPLE, output, redraw, threads or 0)
     verdict, stage, images = verify_frame(load_job(job, sets), options)
@@ -147,8 +147,8 @@ def _print_verdict(verdict: Any, as_json: Path | None) -> None:
     """The verdict as a table on stdout, as JSON, or both."""
     import json
 
-    from quiltcli.verify import COLUMNS, verdict_rows
-    from quiltcli.wholefile import write_text
+    from quiltcli.analysis.verify import COLUMNS, verdict_rows
+    from quiltcli.formats.whole import write_text
 
     text = json.dumps(verdict.as_json(), indent=2, allow_nan=False)
     if as_json == Path("-"):
@@ -167,8 +167,8 @@ def _print_verdict(verdict: Any, as_json: Path | None) -> None:
 @click.option("--overwrite", is_flag=True, help="Replace images that exist.")
 def unmap(quilts: tuple[Path, ...], layout: Path, output: Path, overwrite: bool) -> None:
     """Cut facet images out of existing QUILTS."""
+    from quiltcli.images.unmap import unmap as unmap_quilts
     from quiltcli.layout import read_layout
-    from quiltcli.unmapfiles import unmap as unmap_quilts
 
     written = unmap_quilts(quilts, read_layout(layout), output, overwrite=overwrite)
     click.echo(f"{len(written)} facet images in {output / 'facets'}")

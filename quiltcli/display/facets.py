@@ -11,8 +11,8 @@ import numpy as np
 from quiltcli.display.edges import SharedEdges, find_shared_edges
 from quiltcli.display.polygon import convex, ear_clip, plane_coordinates
 from quiltcli.errors import Problem
+from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, facet_from_world, segments
-from quiltcli.yamlfile import Source
 
 
 @dataclass(frozen=True, eq=False)

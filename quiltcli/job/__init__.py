@@ -4,11 +4,12 @@ Load a file and every problem in it comes in one `JobError`; every model and par
 `source`, whose `problem(key, message)` points into the file when a later stage finds something.
 """
 
+from quiltcli.job.digest import file_sha256, job_sha256
 from quiltcli.job.display import UNITS, DisplayFile, FacetSpec, ResolutionSpec, TransformSpec
 from quiltcli.job.dump import dump_job, dump_yaml
-from quiltcli.job.hashing import file_sha256, job_sha256
+from quiltcli.job.job import CHANNELS, COMPRESSIONS, JobFile, OutputSpec, RenderSpec
 from quiltcli.job.layout import PACKING_METHODS, LayoutFile, PackSpec, PageSpec, PlaceSpec, UvLayoutSpec
-from quiltcli.job.loading import (
+from quiltcli.job.load import (
     check_file,
     file_kind,
     load_display_file,
@@ -16,7 +17,6 @@ from quiltcli.job.loading import (
     load_layout_file,
     load_scene_file,
 )
-from quiltcli.job.render import CHANNELS, COMPRESSIONS, JobFile, OutputSpec, RenderSpec
 from quiltcli.job.scene import (
     AmbientLight,
     DirectionalLight,

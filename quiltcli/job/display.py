@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, WithJsonSchema
 
 from quiltcli import geometry
-from quiltcli.job.base import (
+from quiltcli.job.layout import UvLayoutSpec
+from quiltcli.job.model import (
     Complaint,
     Count,
     Direction,
@@ -28,7 +29,6 @@ from quiltcli.job.base import (
     exactly_one,
     one_of,
 )
-from quiltcli.job.layout import UvLayoutSpec
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 

@@ -13,10 +13,10 @@ from yaml.emitter import Emitter
 from yaml.representer import SafeRepresenter
 from yaml.serializer import Serializer
 
-from quiltcli.frames import format_frames
-from quiltcli.job.base import Model
-from quiltcli.job.render import JobFile
-from quiltcli.yamlcore import CoreResolver
+from quiltcli.formats.yaml.core import CoreResolver
+from quiltcli.job.frames import format_frames
+from quiltcli.job.job import JobFile
+from quiltcli.job.model import Model
 
 
 class _Dumper(Emitter, Serializer, SafeRepresenter, CoreResolver):

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from quiltcli.job.base import (
+from quiltcli.job.model import (
     AnyPath,
     Complaint,
     Count,

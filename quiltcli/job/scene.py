@@ -6,7 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from quiltcli.job.base import (
+from quiltcli.job.display import TransformSpec
+from quiltcli.job.model import (
     Direction,
     FileModel,
     Listed,
@@ -21,7 +22,6 @@ from quiltcli.job.base import (
     either,
     suggest,
 )
-from quiltcli.job.display import TransformSpec
 
 
 class MaterialSpec(Model):

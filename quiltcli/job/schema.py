@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from quiltcli.job.loading import MODELS
+from quiltcli.job.load import MODELS
 
 
 def schemas() -> dict[str, str]:

@@ -10,8 +10,9 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
 from quiltcli.errors import JobError
-from quiltcli.frames import parse_frames
-from quiltcli.job.base import (
+from quiltcli.job.display import UNITS, Units
+from quiltcli.job.frames import parse_frames
+from quiltcli.job.model import (
     Complaint,
     Direction,
     ExistingFile,
@@ -25,7 +26,6 @@ from quiltcli.job.base import (
     describe,
     exactly_one,
 )
-from quiltcli.job.display import UNITS, Units
 
 Vector = tuple[float, float, float]
 

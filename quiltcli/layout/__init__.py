@@ -3,10 +3,10 @@
 from quiltcli.layout.align import align
 from quiltcli.layout.check import check_layout, layout_problems
 from quiltcli.layout.file import layout_text, read_layout, write_layout
-from quiltcli.layout.fromuv import layout_from_polygons, layout_from_uv
+from quiltcli.layout.from_uv import layout_from_polygons, layout_from_uv
+from quiltcli.layout.layout import Layout, quilt_polygons, whole_pixel
 from quiltcli.layout.owners import pixel_owners
-from quiltcli.layout.picture import layout_picture
-from quiltcli.layout.record import Layout, quilt_polygons, whole_pixel
+from quiltcli.layout.picture.picture import layout_picture
 from quiltcli.layout.spans import Spans, facet_spans, fill
 
 __all__ = [

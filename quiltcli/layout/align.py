@@ -10,7 +10,7 @@ import numpy as np
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import LayoutError, Problem, raise_all
 from quiltcli.geometry import FloatArray, IntArray, cross, dot, segments
-from quiltcli.layout.record import Layout
+from quiltcli.layout.layout import Layout
 
 _OFF_PLANE = 2e-4  # of a facet's size: twice what a face may be out of plane
 

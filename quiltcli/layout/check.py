@@ -8,7 +8,7 @@ import numpy as np
 
 from quiltcli.errors import LayoutError, Problem, raise_all
 from quiltcli.geometry import FloatArray, Int32Array
-from quiltcli.layout.record import (
+from quiltcli.layout.layout import (
     PIXEL_TOLERANCE,
     Layout,
     facet_pixels_inside_page,

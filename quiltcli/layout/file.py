@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from quiltcli.formats.whole import write_text
 from quiltcli.geometry import Int32Array
 from quiltcli.layout.check import check_layout
-from quiltcli.layout.record import Layout
-from quiltcli.wholefile import write_text
+from quiltcli.layout.layout import Layout
 
 if TYPE_CHECKING:
     from quiltcli.job import LayoutFile

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import LayoutError
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, segments
-from quiltcli.layout.record import Layout, quilt_polygons
+from quiltcli.layout.layout import Layout, quilt_polygons
 from quiltcli.layout.spans import Spans, facet_spans, overlaps, snapped
 
 Owners: TypeAlias = NDArray[np.int16] | NDArray[np.int32]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, segments
-from quiltcli.layout.record import Layout, quilt_polygons
+from quiltcli.layout.layout import Layout, quilt_polygons
 
 _GRID = 2.0**20
 

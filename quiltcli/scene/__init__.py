@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from quiltcli.scene.load import load_scene
-from quiltcli.scene.record import Lights, Materials, Scene
+from quiltcli.scene.scene import Lights, Materials, Scene
 
 __all__ = ["Lights", "Materials", "Scene", "load_scene"]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, dot, normalized
+from quiltcli.scene.importers.part import Part
 from quiltcli.scene.normals import CREASE_DEG, face_normals, smoothed
-from quiltcli.scene.part import Part
 
 # Height over length below which a triangle is a line.
 _THINNEST = 1e-12

@@ -11,11 +11,11 @@ import numpy as np
 
 from quiltcli.errors import Problem, SceneError, raise_all
 from quiltcli.geometry import Float32Array, FloatArray, normalized
-from quiltcli.scene.asset import Asset, read_asset
 from quiltcli.scene.bake import Baked, bake
-from quiltcli.scene.part import Part, placed
-from quiltcli.scene.record import Lights, Scene
-from quiltcli.scene.surface import Surface, material_table
+from quiltcli.scene.importers.asset import Asset, read_asset
+from quiltcli.scene.importers.part import Part, placed
+from quiltcli.scene.materials import Surface, material_table
+from quiltcli.scene.scene import Lights, Scene
 
 if TYPE_CHECKING:
     from quiltcli.job.scene import LightSpec, ObjectSpec, SceneFile

@@ -147,7 +147,7 @@ def _processor() -> str:
     """The processor's name, family and model: caches and instructions differ, and ratios with them."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
-    told = dict(map(str.strip, line.split(":", 1)) for line in reversed(lines) if ":" in line)
+    told = dict(map(str.strip, line.split(":", 1)) for line in lines if ":" in line)
     if "model name" not in told:
         return platform.processor() or platform.machine()
     return f"{told['model name']} (family {told.get('cpu family', '?')}, model {told.get('model', '?')})"

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from quiltcli.blank import new_buffers
-from quiltcli.draw import draw_frame
-from quiltcli.pool import Pool, can_fork, shared_buffers
-from quiltcli.stage import Stage
-from quiltcli.viewer import Viewer
+from quiltcli.render.buffers import new_buffers
+from quiltcli.render.frame import draw_frame
+from quiltcli.render.setup import Stage
+from quiltcli.render.workers import Pool, can_fork, shared_buffers
+from quiltcli.viewer.viewer import Viewer
 from tests.benchmarks import meshes, opengl
 from tests.benchmarks.race import Times, race
 from tests.benchmarks.stages import Place, all_hits, binned, model, stage_for, viewer_of, with_mesh

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import OpenEXR
 
-from quiltcli import raster
-from quiltcli.blank import Buffers, new_buffers
-from quiltcli.draw import draw_frame
-from quiltcli.exr import write_exr
+from quiltcli.formats.exr.image import write_exr
 from quiltcli.geometry import BoolArray
-from quiltcli.pool import Pool, can_fork, shared_buffers
-from quiltcli.stage import Stage
-from quiltcli.unmap import page_of
-from quiltcli.viewer import Viewer
+from quiltcli.images.facets import page_of
+from quiltcli.render.buffers import Buffers, new_buffers
+from quiltcli.render.frame import draw_frame
+from quiltcli.render.setup import Stage
+from quiltcli.render.workers import Pool, can_fork, shared_buffers
+from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility import draw as raster
 from tests.benchmarks import meshes, opengl
 from tests.benchmarks.embree import caster
 from tests.benchmarks.meshes import Mesh

@@ -9,7 +9,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from quiltcli.geometry import Float32Array
-from quiltcli.raster import Sight
+from quiltcli.visibility.draw import Sight
 
 
 def caster(sight: Sight, rays: Sequence[Float32Array]) -> Callable[[], int]:

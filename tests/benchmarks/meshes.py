@@ -13,7 +13,7 @@ import numpy as np
 
 from quiltcli.geometry import FloatArray, Int32Array, cross, normalized
 from quiltcli.scene import Lights, Materials, Scene
-from tests.rig import icosphere
+from tests.helpers.in_memory import icosphere
 
 DATA = "QUILT_BENCH_DATA"
 """Environment variable: the folder of the Stanford dragon at its four resolutions."""

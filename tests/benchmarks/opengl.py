@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray
-from quiltcli.raster import Frame
-from quiltcli.stage import Stage
+from quiltcli.render.setup import Stage
+from quiltcli.visibility.draw import Frame
 from tests.benchmarks.stages import facet_pairs
 
 _VERTEX = """#version 330
@@ -37,7 +37,7 @@ void main() {
 }
 """
 
-# The same light that `quiltcli.shading` computes.
+# The same light that `quiltcli.shading.shade` computes.
 _GGX = """#version 330
 in vec3 surface;
 in vec3 point;

@@ -21,9 +21,9 @@ from quiltcli.display import Facets, corner_pixels, load_display
 from quiltcli.geometry import FloatArray, next_in_row
 from quiltcli.job import load_display_file
 from quiltcli.layout import fill
-from quiltcli.packing import METHODS, STEADY, PackInput, pack
-from quiltcli.packing.model import used_height
-from quiltcli.packing.shortage import scaled
+from quiltcli.layout.packing import METHODS, STEADY, PackInput, pack
+from quiltcli.layout.packing.model import used_height
+from quiltcli.layout.packing.shortage import scaled
 
 MODELS = Path(__file__).parents[2] / "display_models"
 STRIP = {

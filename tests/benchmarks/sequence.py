@@ -13,14 +13,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-from quiltcli.blank import new_buffers
-from quiltcli.draw import draw_frame
 from quiltcli.job import load_job
-from quiltcli.outputs import write_frame
-from quiltcli.render import Listener, Prepared, RenderOptions, prepare, render_frames
+from quiltcli.render.buffers import new_buffers
+from quiltcli.render.frame import draw_frame
+from quiltcli.render.outputs import write_frame
+from quiltcli.render.sequence import Listener, Prepared, RenderOptions, prepare, render_frames
 from tests.benchmarks.meshes import Mesh
 from tests.benchmarks.race import children
-from tests.rig import icosphere
+from tests.helpers.in_memory import icosphere
 
 _JOB = """quilt_job: 1
 display: display.yaml

@@ -8,21 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
-from quiltcli.binframe import bin_frame
 from quiltcli.display import Facets, lit_facets, load_display
-from quiltcli.draw import plan_of
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
-from quiltcli.homography import quilt_rays
 from quiltcli.job import JobFile, ResolutionSpec, load_display_file
 from quiltcli.layout import align
-from quiltcli.packing import pack
-from quiltcli.raster import Frame, batches, rasterize
+from quiltcli.layout.packing import pack
+from quiltcli.projection.planar import quilt_rays
+from quiltcli.render.frame import plan_of
+from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene import Scene
-from quiltcli.shading import shading_wants
-from quiltcli.stage import Stage, stage_of
-from quiltcli.viewer import Viewer
+from quiltcli.shading.shade import shading_wants
+from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.draw import Frame, batches, rasterize
+from quiltcli.visibility.shares import bin_frame
 from tests.benchmarks.meshes import Mesh, scene_of
-from tests.rig import CUBE, CUBE_FACES, display, icosphere, viewer
+from tests.helpers.in_memory import CUBE, CUBE_FACES, display, icosphere, viewer
 
 EYE = np.array([2.2, 1.8, 3.2])
 """Where the eye is, from the middle of a display that reaches 1 to all sides."""

@@ -13,8 +13,13 @@ from contextlib import ExitStack, contextmanager
 from types import GeneratorType
 from typing import Any
 
-from quiltcli import batch, binframe, binning, channels, draw, raster
-from quiltcli.tileshading import NodeShader
+from quiltcli.render import batch
+from quiltcli.render import frame as draw
+from quiltcli.shading import aovs as channels
+from quiltcli.shading.adaptive import NodeShader
+from quiltcli.visibility import draw as raster
+from quiltcli.visibility import shares as binframe
+from quiltcli.visibility.binning import pairs as binning
 
 STAGES: tuple[tuple[object, str, str], ...] = (
     (draw, "bin_frame", "bin"),

@@ -1,0 +1,156 @@
+"""Find every problem of files at once: in the YAML, in what it names, and between the two.
+
+A stage that fails keeps only those from running that need what it would have made: a broken mesh
+does not hide a viewer that looks along up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from quiltcli.display import Facets, load_display
+from quiltcli.errors import Problem, QuiltError
+from quiltcli.formats.mesh.read import SUFFIXES
+from quiltcli.formats.yaml.source import parse_yaml
+from quiltcli.job import (
+    JobFile,
+    LayoutFile,
+    PackSpec,
+    check_file,
+    file_kind,
+    load_display_file,
+    load_layout_file,
+    load_scene_file,
+)
+from quiltcli.job.model import attach
+from quiltcli.layout import align, read_layout
+from quiltcli.layout.packing import layout_for
+from quiltcli.scene import load_scene
+from quiltcli.viewer.edge_on import eye_problems
+from quiltcli.viewer.viewer import check_viewer, viewer_at
+
+T = TypeVar("T")
+
+
+def check_files(paths: Iterable[Path]) -> list[Problem]:
+    """Every problem of jobs, displays, layouts, scenes and meshes, each once, file by file."""
+    findings = _Findings()
+    for path in paths:
+        findings.check(Path(path))
+    return list(dict.fromkeys(findings.problems))
+
+
+class _Findings:
+    """The problems found so far, and the displays that were built on the way."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.displays: dict[Path, Facets | None] = {}
+        self.seen: set[Path] = set()
+
+    def run(self, stage: Callable[..., T], *given: Any) -> T | None:
+        """What a stage makes, or None with its problems noted; not run without all it is given."""
+        if any(value is None for value in given):
+            return None
+        try:
+            return stage(*given)
+        except QuiltError as error:
+            self.problems += error.problems
+            return None
+
+    def check(self, path: Path) -> None:
+        """Check one file of any kind, and the files it names."""
+        if path in self.seen:
+            return
+        self.seen.add(path)
+        if path.suffix.lower() in SUFFIXES:
+            self.run(load_scene, path)
+            return
+        problems = check_file(path)
+        self.problems += problems
+        kind = self.run(file_kind, path)
+        if kind is not None and (kind == JobFile.kind or not problems):
+            CHECKS[kind](self, path)
+
+    def named_in(self, path: Path) -> None:
+        """What can be said of the files that a wrong job names."""
+        data = parse_yaml(path).data
+        for key in ("display", "layout", "scene"):
+            name = data.get(key)
+            if isinstance(name, str) and (path.parent / name).is_file():
+                self.check(path.parent / name)
+
+    def facets(self, path: Path) -> Facets | None:
+        """The facets of a display file, built once."""
+        if path not in self.displays:
+            self.displays[path] = self.run(load_display, self.run(load_display_file, path))
+        return self.displays[path]
+
+
+def _check_display(findings: _Findings, path: Path) -> None:
+    facets = findings.facets(path)
+    own = load_display_file(path).layout
+    if own is not None:
+        findings.run(layout_for, own, facets)
+
+
+def _check_scene(findings: _Findings, path: Path) -> None:
+    findings.run(load_scene, load_scene_file(path))
+
+
+def _check_layout(findings: _Findings, path: Path) -> None:
+    layout = findings.run(read_layout, path)
+    facets = _display_of(findings, load_layout_file(path))
+    findings.run(align, layout, facets)
+
+
+def _display_of(findings: _Findings, layout: LayoutFile) -> Facets | None:
+    """The display a layout says it was made for, if it says so."""
+    if layout.display is None:
+        return None
+    if layout.display.is_file():
+        return findings.facets(layout.display)
+    what = "is a directory (expected a display file)" if layout.display.is_dir() else "no such file"
+    findings.problems.append(layout.source.problem("display", f"{what}: {layout.display}"))
+    return None
+
+
+def _check_job(findings: _Findings, path: Path) -> None:
+    job = _job_alone(path)
+    if job is None:
+        findings.named_in(path)
+        return
+    found = check_viewer(job.viewer, job.frames)
+    findings.problems += found
+    facets = findings.facets(job.display)
+    choice = job.layout or (load_display_file(job.display).layout if facets else None) or PackSpec()
+    findings.run(layout_for, choice, facets)
+    if facets is None and isinstance(choice, Path):
+        findings.run(read_layout, choice)
+    findings.run(load_scene, findings.run(load_scene_file, job.scene))
+    if facets is not None and not found:
+        viewers = [viewer_at(job.viewer, frame, job.render.depth) for frame in job.frames]
+        findings.problems += eye_problems(facets, viewers, job.viewer.source)
+
+
+def _job_alone(path: Path) -> JobFile | None:
+    """A job whose own file is right, whatever may be wrong with the files it names."""
+    found = parse_yaml(path)
+    try:
+        job = JobFile.model_validate(found.data, context={"base": path.parent})
+    except ValidationError:
+        return None
+    attach(job, found.source)
+    return job
+
+
+CHECKS: dict[str, Callable[[_Findings, Path], None]] = {
+    "quilt_display": _check_display,
+    "quilt_layout": _check_layout,
+    "quilt_scene": _check_scene,
+    "quilt_job": _check_job,
+}

@@ -1,0 +1,107 @@
+"""What a scene is: its objects, materials and lights."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quiltcli.analysis.info.displays import areas, polygon_counts, polygons_text
+from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, number, vector
+from quiltcli.errors import MeshError
+from quiltcli.formats.mesh import read_mesh
+from quiltcli.job import load_scene_file
+from quiltcli.scene import Lights, Scene, load_scene
+
+
+def scene_info(path: Path) -> Info:
+    """Objects, triangles, materials and lights of a scene file.
+
+    Raises:
+        JobError, SceneError: the scene cannot be loaded.
+    """
+    return _info("scene", path, load_scene(load_scene_file(path)), {}, [])
+
+
+def mesh_info(path: Path) -> Info:
+    """A mesh file as a scene of its own and, where its polygons can be read, as a display's mesh.
+
+    Raises:
+        SceneError: the file cannot be loaded.
+    """
+    scene = load_scene(path)
+    try:
+        mesh = read_mesh(path)
+    except MeshError:  # fit to be seen, but not to be a display
+        return _info("mesh", path, scene, {"polygons": None, "texture_coordinates": None}, [])
+    area = areas(mesh.vertices[mesh.corners], mesh.corner_start).sum()
+    data: dict[str, Any] = {
+        "polygons": polygon_counts(mesh.corner_start),
+        "area": float(area),
+        "texture_coordinates": mesh.uv is not None,
+    }
+    lines = [
+        ("polygons", polygons_text(data["polygons"])),
+        ("area", f"{number(float(area))} square units of the file"),
+        ("texture coordinates", "yes" if mesh.uv is not None else "no"),
+    ]
+    return _info("mesh", path, scene, data, lines)
+
+
+def _info(kind: str, path: Path, scene: Scene, more: dict[str, Any], lines: list[tuple[str, str]]) -> Info:
+    objects = _objects(scene)
+    lights = _light_counts(scene.lights)
+    data = {
+        "path": str(path),
+        **more,
+        "triangles": len(scene.triangles),
+        "vertices": len(scene.vertices),
+        "bounds": bounds(scene.vertices),
+        "materials": len(scene.materials.color),
+        "lights": lights,
+        "background": [float(c) for c in scene.background],
+        "notices": list(scene.notices),
+        "objects": objects,
+    }
+    shown = [counted(n, f"{name} light") for name, n in lights.items() if n and name != "headlight"]
+    lines = [
+        *lines,
+        ("objects", f"{len(objects):,}"),
+        ("triangles", f"{len(scene.triangles):,}"),
+        ("vertices", f"{len(scene.vertices):,}"),
+        ("bounds", bounds_text(data["bounds"])),
+        ("materials", f"{len(scene.materials.color):,}"),
+        ("lights", ", ".join(shown + ["a headlight"] * lights["headlight"])),
+        ("background", vector(data["background"])),
+        *(("note", notice) for notice in scene.notices),
+    ]
+    columns = ("object", "name", "triangles", "from", "to")
+    return Info(kind, data, lines, columns, [_row(i, entry) for i, entry in enumerate(objects, 1)])
+
+
+def _objects(scene: Scene) -> list[dict[str, Any]]:
+    """Name, triangle count and bounds of every object; triangles of an object lie together."""
+    ends = np.searchsorted(scene.object, np.arange(len(scene.objects) + 1))
+    return [
+        {
+            "name": name,
+            "triangles": int(ends[i + 1] - ends[i]),
+            "bounds": bounds(scene.vertices[scene.triangles[ends[i] : ends[i + 1]].ravel()]),
+        }
+        for i, name in enumerate(scene.objects)
+    ]
+
+
+def _row(number_: int, entry: dict[str, Any]) -> list[str]:
+    box = entry["bounds"]
+    return [str(number_), entry["name"], f"{entry['triangles']:,}", vector(box["min"]), vector(box["max"])]
+
+
+def _light_counts(lights: Lights) -> dict[str, int]:
+    return {
+        "directional": len(lights.directional_direction),
+        "point": len(lights.point_position),
+        "ambient": int(lights.ambient.any()),
+        "headlight": int(lights.headlight),
+    }

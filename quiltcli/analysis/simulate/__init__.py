@@ -1,0 +1,183 @@
+"""Simulation: the display as a lit object, seen from the viewer's eye or from anywhere else.
+
+The picture is drawn by the program's own rasterizer through a camera that is a display of one facet;
+its scene is the display's mesh. What a ray meets there it looks up in the facets' images. From the
+viewer's eye the result must be the picture that one would get of the scene without a display.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from quiltcli.analysis.simulate.compare import Comparison, compare, figures, heat_map, heat_scale, seam_pixels
+from quiltcli.analysis.simulate.images import shown_images
+from quiltcli.analysis.simulate.lookup import Shown
+from quiltcli.analysis.simulate.picture import (
+    direct_light,
+    displayed_light,
+    outlined,
+    visible_facets,
+    with_channels,
+)
+from quiltcli.analysis.simulate.reference import resampled_light
+from quiltcli.analysis.simulate.thirdperson import third_person_camera, third_person_light
+from quiltcli.display import Facets
+from quiltcli.errors import ViewerError, raise_all
+from quiltcli.geometry import Float32Array
+from quiltcli.images.preview import block_means
+from quiltcli.job import JobFile, job_sha256
+from quiltcli.projection.camera import aimed, camera_display, frame_display
+from quiltcli.render.frame import default_threads
+from quiltcli.render.setup import Stage, set_stage
+from quiltcli.viewer.viewer import Viewer, check_viewer, viewer_at
+
+__all__ = [
+    "Comparison",
+    "PictureOptions",
+    "Simulation",
+    "camera_display",
+    "figures",
+    "heat_map",
+    "heat_scale",
+    "simulate",
+]
+
+
+@dataclass(frozen=True)
+class PictureOptions:
+    """What kind of picture is taken.
+
+    Attributes:
+        size: width and height, pixels.
+        place: where the camera stands, world metres; None for the viewer's eye.
+        look_at: what it looks at, world metres; None for the middle of the display.
+        fov: degrees from top to bottom; None shows the whole display.
+        filter: `nearest` shows the pixel that is met, `linear` goes between the four around.
+        samples: rays a pixel, across and down.
+        compare: hold the picture against a direct one of the scene; from the eye only.
+        resampled: say too what resampling alone costs, which takes some more direct pictures.
+        third_person: show the viewer too, who looks at the display; there is nothing to compare then.
+        scene: how a third person sees the scene, a name of `thirdperson.SCENES`.
+        edges: draw a line along the edges of the facets; what is compared is the picture without.
+        threads: batches drawn at a time; 0 takes every core.
+    """
+
+    size: tuple[int, int] = (1200, 900)
+    place: tuple[float, float, float] | None = None
+    look_at: tuple[float, float, float] | None = None
+    fov: float | None = None
+    filter: str = "linear"
+    samples: int = 2
+    compare: bool = True
+    resampled: bool = False
+    third_person: bool = False
+    scene: str = "ghost"
+    edges: bool = False
+    threads: int = 0
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """One picture.
+
+    Attributes:
+        frame: frame number.
+        picture: (H, W, 3) linear light.
+        direct: (H, W, 3) the scene without a display, None where there is nothing to compare with.
+        comparison: the figures, None likewise.
+        source: where the facets' images came from, in words.
+    """
+
+    frame: int
+    picture: Float32Array
+    direct: Float32Array | None
+    comparison: Comparison | None
+    source: str
+
+
+def simulate(
+    job: JobFile, frames: Sequence[int], options: PictureOptions | None = None
+) -> Iterator[Simulation]:
+    """Look at the display with its images on, in some frames of a job.
+
+    The images are those a render of the job has left, where there are any, else drawn in memory.
+
+    Raises:
+        QuiltError: bad input, or images that cannot be read.
+    """
+    options = options or PictureOptions()
+    raise_all(ViewerError, check_viewer(job.viewer, frames))
+    sha = job_sha256(job)
+    stage = set_stage(with_channels(job, ("rgba",)))
+    threads = options.threads or default_threads()
+    for frame in frames:
+        viewer = viewer_at(job.viewer, frame, job.render.depth)
+        shown, source = shown_images(stage, viewer, job.output.directory, sha, threads)
+        yield replace(take_picture(stage, viewer, shown, options), source=source)
+
+
+def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:
+    """One picture of a display with its images on, with its figures where it is taken from the eye."""
+    if options.third_person:
+        return _third_person(stage, viewer, shown, options)
+    camera, fov = _camera(viewer, stage.facets, options)
+    width, height = (options.samples * side for side in options.size)
+    through = camera_display(camera, width, height, fov)
+    threads = options.threads or default_threads()
+    facet = visible_facets(stage, camera, through, threads)
+    light, lit = displayed_light(shown, camera, through, facet, options.filter)
+    picture = plain = block_means(_image(light, width), options.samples)
+    if options.edges:
+        picture = block_means(_image(outlined(light, facet, width), width), options.samples)
+    if options.place is not None or not options.compare:
+        return Simulation(viewer.frame, picture, None, None, "")
+    direct = block_means(_image(direct_light(stage, viewer, through, threads), width), options.samples)
+    on_lit = np.where(lit, facet, -1).reshape(height, width).astype(np.int32)
+    covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
+    coarse = None
+    if options.resampled:
+        coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads, options.filter)
+    once = None if coarse is None else block_means(_image(coarse, width), options.samples)
+    comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples), once)
+    return Simulation(viewer.frame, picture, direct, comparison, "")
+
+
+def _third_person(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:
+    """A picture of the viewer before the display."""
+    place, look_at = (
+        None if point is None else np.asarray(point, dtype=np.float64)
+        for point in (options.place, options.look_at)
+    )
+    aspect = options.size[0] / options.size[1]
+    camera, fov = third_person_camera(viewer, stage.facets, place, look_at, aspect)
+    width, height = (options.samples * side for side in options.size)
+    through = camera_display(camera, width, height, options.fov or fov)
+    threads = options.threads or default_threads()
+    light, facet = third_person_light(
+        stage, viewer, shown, camera, through, options.filter, options.scene, threads
+    )
+    if options.edges:
+        light = outlined(light, facet, width)
+    return Simulation(viewer.frame, block_means(_image(light, width), options.samples), None, None, "")
+
+
+def _image(light: Float32Array, width: int) -> Float32Array:
+    """Flat light (3, P) as an image (H, W, 3)."""
+    return light.reshape(3, -1, width).transpose(1, 2, 0)
+
+
+def _camera(viewer: Viewer, facets: Facets, options: PictureOptions) -> tuple[Viewer, float]:
+    """The picture's camera and its field of view, degrees from top to bottom."""
+    camera = viewer
+    if options.place is not None:
+        camera = replace(
+            viewer, eye=np.asarray(options.place, dtype=np.float64), up=np.array([0.0, 1.0, 0.0])
+        )
+    if options.look_at is not None:
+        camera = aimed(camera, np.asarray(options.look_at, dtype=np.float64) - camera.eye)
+    aspect = options.size[0] / options.size[1]
+    framed, fov = frame_display(camera, facets.corners, aspect, turn=options.look_at is None)
+    return (framed, fov) if options.fov is None else (framed, options.fov)

@@ -1,0 +1,76 @@
+"""The images a display shows in a frame: those on disk, else drawn here and now."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from quiltcli.analysis.simulate.lookup import Shown
+from quiltcli.display import lit_facets
+from quiltcli.formats.exr.image import facet_path, is_complete, quilt_path, read_exr
+from quiltcli.geometry import BoolArray, OwnerArray
+from quiltcli.images.facets import page_of, quilt_buffers
+from quiltcli.images.window import whole_frame
+from quiltcli.layout import pixel_owners
+from quiltcli.render.buffers import Buffers, new_buffers
+from quiltcli.render.methods import draw_frame
+from quiltcli.render.setup import Stage
+from quiltcli.viewer.viewer import Viewer
+
+
+def shown_images(stage: Stage, viewer: Viewer, folder: Path, job_sha: str, threads: int) -> tuple[Shown, str]:
+    """The images of one frame.
+
+    Args:
+        stage: display, layout and scene; its job's channels hold `rgba`.
+        viewer: the frame's viewer.
+        folder: where a render of the job leaves its files.
+        job_sha: hash a file must have to be taken for this job's.
+        threads: batches drawn at a time.
+
+    Returns:
+        The images, and where they came from in words.
+    """
+    lit = lit_facets(stage.facets, viewer.eye) & (stage.layout.page >= 0)
+    buffers: Buffers | None = None
+    owners: OwnerArray = stage.owners
+    if (buffers := _quilts(stage, viewer.frame, folder, job_sha)) is not None:
+        source = f"read from {folder / 'quilt'}"
+    elif (buffers := _facets(stage, lit, viewer.frame, folder, job_sha)) is not None:
+        source = f"read from {folder / 'facets'}"
+        owners = pixel_owners(stage.layout)  # a facet's image ends at its polygon
+    else:
+        buffers, source = new_buffers(stage), "drawn for this picture"
+        draw_frame(stage, viewer, buffers, threads)
+    return Shown(stage.facets, stage.layout, lit, buffers, owners, viewer.eye), source
+
+
+def _quilts(stage: Stage, frame: int, folder: Path, job_sha: str) -> Buffers | None:
+    """The quilt on disk, None where a page is missing or not this job's."""
+    paths = [quilt_path(folder, page + 1, frame) for page in range(len(stage.layout.pages))]
+    if not all(is_complete(path, job_sha, frame) for path in paths):
+        return None
+    buffers = {name: np.zeros(stage.owners.size, dtype=np.float16) for name in "RGB"}
+    for page, path in enumerate(paths):
+        channels = whole_frame(read_exr(path))
+        if any(name not in channels for name in "RGB"):
+            return None
+        for name, flat in buffers.items():
+            page_of(flat, stage.layout, page)[:] = channels[name]
+    return buffers
+
+
+def _facets(stage: Stage, lit: BoolArray, frame: int, folder: Path, job_sha: str) -> Buffers | None:
+    """The quilt put together from the lit facets' images on disk, None where one is missing."""
+    rows = np.flatnonzero(lit).tolist()
+    paths = {row: facet_path(folder, int(stage.layout.facet[row]), frame) for row in rows}
+    if not paths or not all(is_complete(path, job_sha, frame) for path in paths.values()):
+        return None
+    images = {}
+    for row, path in paths.items():
+        channels = whole_frame(read_exr(path))
+        if any(name not in channels for name in "RGB"):
+            return None
+        images[row] = {name: channels[name] for name in "RGB"}
+    return quilt_buffers(images, stage.layout, stage.owners)

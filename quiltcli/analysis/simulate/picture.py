@@ -1,0 +1,144 @@
+"""What a picture's camera sees: of the display with its images on, or of the scene itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from quiltcli.analysis.simulate.lookup import Shown, look_up, quilt_places
+from quiltcli.display import Facets, lit_facets, triangulate
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, dot, normalized
+from quiltcli.job import JobFile
+from quiltcli.layout import Layout
+from quiltcli.projection.planar import eye_from_quilt
+from quiltcli.render.buffers import new_buffers
+from quiltcli.render.frame import draw_frame
+from quiltcli.render.setup import Stage, stage_of
+from quiltcli.scene import Lights, Materials, Scene
+from quiltcli.viewer.viewer import Viewer
+
+Camera: TypeAlias = tuple[Facets, Layout]
+"""A display of one facet, as `camera_display` makes it."""
+
+_SURROUND = np.array([0.05, 0.052, 0.056], dtype=np.float32)
+_DARK = 0.035  # a screen that is off, turned to the camera
+_LINE = np.float32(0.28)
+
+
+def with_channels(job: JobFile, channels: tuple[str, ...]) -> JobFile:
+    """The job with other channels."""
+    return job.model_copy(update={"output": job.output.model_copy(update={"channels": channels})})
+
+
+def exact(job: JobFile, **render: object) -> JobFile:
+    """The job by the method that is exact, and with other keys of `render`."""
+    update = {"method": "homography", "depth_bits": None, **render}
+    return job.model_copy(update={"render": job.render.model_copy(update=update)})
+
+
+def visible_facets(stage: Stage, camera: Viewer, through: Camera, threads: int) -> Int32Array:
+    """The facet (P,) that every ray of the picture meets first, from either side; −1 for none."""
+    triangles, facet = triangulate(stage.facets)
+    met, _ = first_triangles(stage, camera, through, mesh_scene(stage.facets.corners, triangles), threads)
+    result: Int32Array = np.concatenate((facet, [-1])).astype(np.int32)[met]
+    return result
+
+
+def first_triangles(
+    stage: Stage, camera: Viewer, through: Camera, scene: Scene, threads: int
+) -> tuple[Int32Array, Float32Array]:
+    """The triangle of a scene (P,) that every ray meets first, from either side, −1 for none; how far."""
+    # Everything from a micrometre on: the viewer's near and far are for the scene, not for the display.
+    here = replace(camera, near=1e-6, far=1e6, depth="radial")
+    job = exact(with_channels(stage.job, ("triangle", "Z")), samples=1, backface_culling=False)
+    bare = camera_stage(job, through, scene)
+    buffers = new_buffers(bare)
+    draw_frame(bare, here, buffers, threads)
+    return buffers["triangle"].astype(np.int32) - 1, buffers["Z"]
+
+
+def camera_stage(job: JobFile, through: Camera, scene: Scene) -> Stage:
+    """The stage of a picture: a scene behind the camera's one facet, with exact depth."""
+    exact = job.render.model_copy(update={"method": "homography", "depth_bits": None})
+    return stage_of(job.model_copy(update={"render": exact}), *through, scene, bleed=0)
+
+
+def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:
+    """A scene of bare triangles: what they look like is not asked."""
+    nothing = np.zeros((0, 3), dtype=np.float32)
+    return Scene(
+        vertices=vertices,
+        triangles=triangles,
+        normals=np.zeros(vertices.shape, dtype=np.float32),
+        colors=np.ones(vertices.shape, dtype=np.float32),
+        flat=np.ones(len(triangles), dtype=np.bool_),
+        object=np.zeros(len(triangles), dtype=np.int32),
+        material=np.zeros(len(triangles), dtype=np.int32),
+        objects=("display",),
+        materials=Materials(
+            np.ones((1, 3), np.float32),
+            np.zeros(1, np.float32),
+            np.ones(1, np.float32),
+            np.zeros((1, 3), np.float32),
+            np.ones(1, dtype=np.bool_),
+            np.ones(1, np.float32),
+        ),
+        lights=Lights(nothing, nothing, nothing, nothing, np.zeros(3, np.float32), headlight=False),
+        background=np.zeros(3, dtype=np.float32),
+        notices=(),
+    )
+
+
+def displayed_light(
+    shown: Shown, camera: Viewer, through: Camera, facet: Int32Array, how: str
+) -> tuple[Float32Array, BoolArray]:
+    """What the camera sees of the display: (3, P) linear light, and (P,) where it is an image.
+
+    Back sides, and facets that are dark for this viewer, are grey, the darker the more they turn away.
+    """
+    light = np.repeat(_SURROUND[:, None], facet.size, axis=1)
+    facing = lit_facets(shown.facets, camera.eye) & shown.lit
+    met = np.flatnonzero(facet >= 0)
+    rays = picture_rays(camera, through, met)
+    grey = np.abs(dot(shown.facets.normal[facet[met]], normalized(rays.T)))
+    light[:, met] = (_DARK * (0.25 + 0.75 * grey)).astype(np.float32)
+    bright = facing[facet[met]]
+    place = quilt_places(shown, facet[met[bright]], rays[:, bright], camera.eye, facing)
+    light[:, met[bright]] = look_up(shown, facet[met[bright]], place, how)
+    lit = np.zeros(facet.size, dtype=np.bool_)
+    lit[met[bright]] = True
+    return light, lit
+
+
+def picture_rays(camera: Viewer, through: Camera, pixel: IntArray) -> FloatArray:
+    """Directions (3, P) from the camera through the centres of picture pixels with these addresses."""
+    matrix = eye_from_quilt(*through, camera.eye)[0]
+    row, column = np.divmod(pixel, through[1].pages[0, 0])
+    result: FloatArray = matrix[:, :1] * (column + 0.5) + matrix[:, 1:2] * (row + 0.5) + matrix[:, 2:]
+    return result
+
+
+def direct_light(stage: Stage, viewer: Viewer, through: Camera, threads: int) -> Float32Array:
+    """The scene without a display (3, P), through the same camera and by the same renderer, exactly."""
+    direct = camera_stage(exact(stage.job), through, stage.scene)
+    buffers = new_buffers(direct)
+    draw_frame(direct, viewer, buffers, threads)
+    return np.stack([buffers[name].astype(np.float32) for name in "RGB"])
+
+
+def outlined(light: Float32Array, facet: Int32Array, width: int) -> Float32Array:
+    """The light (3, P) of a picture with a thin line along all edges of facets.
+
+    Args:
+        light: as of `displayed_light`.
+        facet: (P,) facet of every ray, −1 for none.
+        width: rays in a row.
+    """
+    rows = facet.reshape(-1, width)
+    edge = np.zeros(rows.shape, dtype=np.bool_)
+    edge[:, 1:] |= rows[:, 1:] != rows[:, :-1]
+    edge[1:] |= rows[1:] != rows[:-1]
+    edge[:, :-1] |= edge[:, 1:]
+    return np.where(edge.reshape(-1), np.float32(0.4) * light + np.float32(0.6) * _LINE, light)

@@ -1,0 +1,190 @@
+"""The walk from a job to the verdict on one of its frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quiltcli.analysis.verify.images import Images, find_images
+from quiltcli.analysis.verify.pixels import Trial, check_pixels
+from quiltcli.analysis.verify.sample import every_pixel, sampled_pixels
+from quiltcli.analysis.verify.seams import Seams, check_seams, seam_points
+from quiltcli.analysis.verify.tally import Fault, Tally
+from quiltcli.display import lit_facets, shared_edges
+from quiltcli.errors import ViewerError, raise_all
+from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.job import JobFile
+from quiltcli.projection.planar import quilt_rays
+from quiltcli.render.frame import default_threads
+from quiltcli.render.sequence import viewer_path
+from quiltcli.render.setup import Stage, set_stage
+from quiltcli.viewer.edge_on import eye_problems
+from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.rays.embree import aim
+from quiltcli.visibility.rays.exact import Neighbours
+
+SAMPLE = 200_000
+_SEAM_POINTS, _ALL_SEAM_POINTS = 16, 4096
+_BLOCK = 1 << 22
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What holding a frame against rays has shown.
+
+    Attributes:
+        frame: frame number.
+        images: where the images come from, in words.
+        everything: whether every pixel was looked at, not a sample.
+        lit: facets whose lit side faces the eye.
+        inside: pixels inside facets.
+        bleed: pixels in their bleed.
+        outside: pixels of no lit facet that show something all the same.
+        seams: the seams between facets.
+    """
+
+    frame: int
+    images: str
+    everything: bool
+    lit: int
+    inside: Tally
+    bleed: Tally
+    outside: int
+    seams: Seams
+
+    @property
+    def passed(self) -> bool:
+        """Whether all tolerances are met."""
+        return not (self.inside.failures or self.bleed.failures or self.outside or self.seams.failures)
+
+    @property
+    def words(self) -> str:
+        """The verdict in a few words."""
+        if not self.lit:
+            return "nothing to verify, no facet is lit"
+        return "within tolerance" if self.passed else "OUT OF TOLERANCE"
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The first of all faults."""
+        return self.inside.faults + self.bleed.faults + self.seams.faults
+
+    def as_json(self) -> dict[str, Any]:
+        """The verdict for programs."""
+        return {
+            "quilt_verify": 1,
+            "frame": self.frame,
+            "images": self.images,
+            "all_pixels": self.everything,
+            "lit_facets": self.lit,
+            "facets": self.inside.as_json(),
+            "bleed": self.bleed.as_json(),
+            "outside": self.outside,
+            "seams": self.seams.as_json(),
+            "faults": [fault.as_json() for fault in self.faults],
+            "passed": self.passed,
+        }
+
+
+@dataclass(frozen=True)
+class VerifyOptions:
+    """How a frame is verified.
+
+    Attributes:
+        frame: the frame; the job's first when None.
+        everything: look at every pixel.
+        pixels: pixels to look at otherwise.
+        folder: where the images are, instead of the job's folder.
+        redraw: draw in memory even if there are images.
+        threads: blocks looked at at a time; 0 takes every core. The verdict does not depend on it.
+    """
+
+    frame: int | None = None
+    everything: bool = False
+    pixels: int = SAMPLE
+    folder: Path | None = None
+    redraw: bool = False
+    threads: int = 0
+
+
+def verify(job: JobFile, options: VerifyOptions | None = None) -> tuple[Verdict, Stage, Images]:
+    """Hold one frame of a job against rays.
+
+    Returns:
+        The verdict, and the stage and the images it is about.
+
+    Raises:
+        QuiltError: the job cannot be rendered, or this machine has no Embree.
+    """
+    options = options or VerifyOptions()
+    frame = job.frames[0] if options.frame is None else options.frame
+    viewers = viewer_path(job, [frame])
+    stage = set_stage(job)
+    raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
+    threads = options.threads or default_threads()
+    folder = options.folder or job.output.directory
+    images = find_images(stage, viewers[0], folder, threads, options.redraw)
+    return verify_images(stage, viewers[0], images, options), stage, images
+
+
+def verify_images(stage: Stage, viewer: Viewer, images: Images, options: VerifyOptions) -> Verdict:
+    """Hold images of a frame against rays, at the pixels `options` ask for."""
+    trial = make_trial(stage, viewer, images)
+    most = _ALL_SEAM_POINTS if options.everything else _SEAM_POINTS
+    points = seam_points(trial, shared_edges(stage.facets), most)
+    if options.everything:
+        blocks = every_pixel(stage.owners, trial.rays.lit)
+    else:
+        bleed = stage.job.render.bleed
+        also = np.unique(points.pixel[points.pixel >= 0])
+        blocks = sampled_pixels(
+            stage.layout, stage.owners, trial.rays.lit, bleed, options.pixels, viewer.frame, also
+        )
+    inside, bled = _check_blocks(trial, blocks, options.threads or default_threads())
+    return Verdict(
+        frame=viewer.frame,
+        images=images.words,
+        everything=options.everything,
+        lit=int(np.count_nonzero(trial.rays.lit)),
+        inside=inside,
+        bleed=bled,
+        outside=_shown_outside(stage, trial.rays.lit, images),
+        seams=check_seams(trial, points),
+    )
+
+
+def _check_blocks(trial: Trial, blocks: Iterator[IntArray], threads: int) -> tuple[Tally, Tally]:
+    """Tallies of facets and bleed, added up in the order of the blocks, a few of them in memory at a time."""
+    inside, bleed = Tally(), Tally()
+    with ThreadPoolExecutor(threads) as pool:
+        while some := list(islice(blocks, 4 * threads)):
+            for facets_tally, bleed_tally in pool.map(partial(check_pixels, trial), some):
+                inside, bleed = inside + facets_tally, bleed + bleed_tally
+    return inside, bleed
+
+
+def make_trial(stage: Stage, viewer: Viewer, images: Images) -> Trial:
+    """Prepare what the pixels of a frame are verified with."""
+    scene = stage.scene
+    rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, viewer.eye), viewer.eye)
+    target = aim(scene.vertices, scene.triangles, viewer, stage.job.render.backface_culling)
+    neighbours = Neighbours(scene.vertices, scene.triangles)
+    return Trial(stage.layout, stage.owners, rays, target, neighbours, images)
+
+
+def _shown_outside(stage: Stage, lit: BoolArray, images: Images) -> int:
+    """Pixels with a depth that belong to no lit facet."""
+    shown = np.concatenate(([False], lit))
+    count = 0
+    for start in range(0, stage.owners.size, _BLOCK):
+        part = slice(start, start + _BLOCK)
+        stray = (images.channels["Z"][part] != np.inf) & ~shown[np.abs(stage.owners[part])]
+        count += int(np.count_nonzero(stray))
+    return count

@@ -1,0 +1,1 @@
+"""Finding out where the pieces of a real display are."""

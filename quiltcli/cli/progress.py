@@ -1,0 +1,86 @@
+"""Progress on stderr: a bar on a terminal, one plain line a frame anywhere else."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TextIO
+
+from quiltcli.render.report import FrameRecord
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a run tells while it works.
+
+    Attributes:
+        begin: to be called with the number of frames to come.
+        frame_done: to be called when a frame's files are all there.
+        say: a line for the user between the frames.
+    """
+
+    begin: Callable[[int], None]
+    frame_done: Callable[[FrameRecord], None]
+    say: Callable[[str], None]
+
+
+@contextlib.contextmanager
+def progress(stream: TextIO | None = None) -> Iterator[Progress]:
+    """Show the progress of a run on `stream` (stderr)."""
+    stream = stream or sys.stderr
+    with (_bar if stream.isatty() else _lines)(stream) as shown:
+        yield shown
+
+
+@contextlib.contextmanager
+def _lines(stream: TextIO) -> Iterator[Progress]:
+    frames = done = 0
+
+    def begin(count: int) -> None:
+        nonlocal frames
+        frames = count
+
+    def say(line: str) -> None:
+        stream.write(f"{line}\n")
+        stream.flush()
+
+    def frame_done(record: FrameRecord) -> None:
+        nonlocal done
+        done += 1
+        say(f"frame {record.frame} ({done} of {frames}): {frame_line(record)}")
+
+    yield Progress(begin, frame_done, say)
+
+
+@contextlib.contextmanager
+def _bar(stream: TextIO) -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as RichProgress
+
+    columns = (TextColumn("rendering"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    last = TextColumn("{task.description}")
+    with RichProgress(*columns, last, console=Console(file=stream)) as bar:
+        task = bar.add_task("", total=None)
+
+        def begin(count: int) -> None:
+            bar.update(task, total=count)
+
+        def frame_done(record: FrameRecord) -> None:
+            bar.update(task, advance=1, description=f"frame {record.frame}: {frame_line(record)}")
+
+        def say(line: str) -> None:
+            bar.console.print(line, markup=False, highlight=False)
+
+        yield Progress(begin, frame_done, say)
+
+
+def frame_line(record: FrameRecord) -> str:
+    """A frame in a few words."""
+    seconds = record.total_seconds
+    words = f"{seconds:.2f} s, {record.lit_facets:,} lit facets, {record.visible_pixels:,} pixels"
+    if record.warnings:
+        words += f", {len(record.warnings)} warning" + ("s" if len(record.warnings) > 1 else "")
+    return words

@@ -1,0 +1,1 @@
+"""Bytes to arrays and back: files of any kind. Nothing here knows a facet, a viewer or a quilt."""

@@ -1,0 +1,1 @@
+"""OpenEXR files: pixels and attributes, and whether a file is whole."""

@@ -1,0 +1,273 @@
+"""OpenEXR images: written whole, read strictly, with the provenance every file carries.
+
+One image is one part of planar channels, each (H, W) of float16, float32 or uint32.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from quiltcli.errors import OutputError, Problem
+from quiltcli.formats.exr.check import exr_fault
+from quiltcli.formats.whole import whole_file, write_problem
+from quiltcli.geometry import FloatArray
+from quiltcli.viewer.viewer import Viewer
+
+Channel: TypeAlias = NDArray[Any]
+Window: TypeAlias = tuple[tuple[int, int], tuple[int, int]]
+
+_PIXEL_TYPES = (np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.uint32))
+# What the library derives from the pixels and from `write_exr`'s own arguments.
+_WINDOWS = {"dataWindow", "displayWindow"}
+_STRUCTURE = _WINDOWS | {
+    "channels",
+    "chunkCount",
+    "compression",
+    "lineOrder",
+    "name",
+    "tiles",
+    "type",
+    "version",
+}
+_NAME = re.compile(r"(?P<kind>[A-Za-z]+)_(?P<number>\d+)\.(?P<frame>-?\d{4,})\.exr")
+
+
+@dataclass(frozen=True)
+class Image:
+    """One part of an EXR file.
+
+    Attributes:
+        channels: name → (H, W) float16, float32 or uint32, C-contiguous, owned by the image.
+        attributes: all attributes but the structural ones (windows, compression, channel list …).
+        compression: name as in `compressions()`.
+        data_window: inclusive pixel bounds ((x0, y0), (x1, y1)) of the channels.
+        display_window: inclusive pixel bounds of the frame.
+        name: the part's name, empty in a single-part file.
+    """
+
+    channels: Mapping[str, Channel]
+    attributes: Mapping[str, object]
+    compression: str
+    data_window: Window
+    display_window: Window
+    name: str = ""
+
+
+def compressions() -> dict[str, Any]:
+    """Names of all compressions of the installed OpenEXR, with the library's constants."""
+    found = (name.removesuffix("_COMPRESSION") for name in dir(OpenEXR) if name.endswith("_COMPRESSION"))
+    constants = {name.lower(): getattr(OpenEXR, f"{name}_COMPRESSION") for name in found}
+    return {"none": constants.pop("no"), **dict(sorted(constants.items()))}
+
+
+def compression_constant(name: str) -> Any:
+    """The library's constant for a compression `name`, in any case (OutputError lists the names)."""
+    known = compressions()
+    if name.lower() not in known:
+        raise OutputError(f"compression {name!r} is unknown, expected one of {', '.join(known)}")
+    return known[name.lower()]
+
+
+def use_threads(count: int) -> None:
+    """Let the library compress with so many threads; it has none of its own accord.
+
+    The bytes do not depend on it. They are threads of this process: fork before, not after.
+    """
+    count = count if count > 1 else 0
+    if OpenEXR.global_thread_count() != count:
+        OpenEXR.set_global_thread_count(count)
+
+
+def write_exr(
+    path: Path,
+    channels: Mapping[str, Channel],
+    attributes: Mapping[str, object],
+    compression: str = "zip",
+    *,
+    data_window: Window | None = None,
+    display_window: Window | None = None,
+) -> None:
+    """Write one image, whole or not at all; the same input gives the same bytes.
+
+    Args:
+        path: the file; its folder must exist.
+        channels: name → (H, W) array of float16, float32 or uint32, all of one shape, any strides.
+        attributes: str, int (32 bits), float (stored as 32 bits), Fraction, arrays of 2 to 4 numbers
+            (V3f and its family) and whatever else the library stores.
+        compression: a name of `compressions()`.
+        data_window: where the pixels lie; by default at ((0, 0), (W−1, H−1)).
+        display_window: the frame; by default the data window.
+
+    Raises:
+        OutputError: the file cannot be written; nothing is left behind.
+    """
+    header: dict[str, Any] = {name: _attribute(path, name, value) for name, value in attributes.items()}
+    header["compression"] = compression_constant(compression)
+    header["type"] = OpenEXR.scanlineimage
+    if data_window is not None:
+        header["dataWindow"] = data_window
+    if display_window is not None or data_window is not None:
+        header["displayWindow"] = display_window or data_window
+    pixels = _pixels(path, channels)  # a dict of our own: the library replaces its values
+    with whole_file(path) as temporary:
+        try:
+            OpenEXR.File(header, pixels).write(str(temporary))
+        except RuntimeError as error:
+            raise OutputError(write_problem(path, error)) from error
+        # The library's stream is flushed when it is destroyed, where a full disk goes unreported.
+        if fault := exr_fault(temporary):
+            raise OutputError(Problem(f"cannot be written: what reached the disk {fault}", file=str(path)))
+
+
+def _pixels(path: Path, channels: Mapping[str, Channel]) -> dict[str, Channel]:
+    """Contiguous views or copies of `channels`: the library ignores strides and writes wrong pixels."""
+    shapes = {np.shape(array) for array in channels.values()}
+    if len(shapes) != 1 or len(shape := shapes.pop()) != 2 or 0 in shape:
+        raise OutputError(Problem("channels must share one shape (H, W) that is not empty", file=str(path)))
+    for name, array in channels.items():
+        if array.dtype not in _PIXEL_TYPES:
+            expected = "expected float16, float32 or uint32"
+            raise OutputError(Problem(f"channel {name} is {array.dtype}, {expected}", file=str(path)))
+    return {name: np.ascontiguousarray(array) for name, array in channels.items()}
+
+
+def _attribute(path: Path, name: str, value: object) -> object:
+    """`value` in a form the library stores unharmed; it cuts numbers to 32 bits without a word."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, int | Fraction):
+        top, bottom = value.as_integer_ratio()
+        if not (-(2**31) <= top < 2**31 and bottom < 2**32):
+            wrong = f"is {value}, expected an integer or a fraction of 32 bits"
+            raise OutputError(Problem(wrong, file=str(path), key=name))
+    return value
+
+
+def read_parts(path: Path) -> tuple[Image, ...]:
+    """Read every part of an EXR file, in file order.
+
+    Raises:
+        OutputError: the file is missing, truncated, damaged, subsampled or no flat OpenEXR image.
+    """
+    headers = _read_headers(path)
+    # `with` would empty the parts: the arrays are handed over by the library, not shared with it.
+    parts = _open(path, separate_channels=True).parts
+    if len(parts) != len(headers):
+        wrong = f"is damaged: {len(parts)} of {len(headers)} parts can be read"
+        raise OutputError(Problem(wrong, file=str(path)))
+    images = tuple(_image(part.header, part.channels) for part in parts)
+    if any(len({channel.shape for channel in image.channels.values()}) > 1 for image in images):
+        raise OutputError(Problem("has subsampled channels, expected all of one size", file=str(path)))
+    return images
+
+
+def read_exr(path: Path) -> Image:
+    """Read a file of one part; errors as for `read_parts`."""
+    parts = read_parts(path)
+    if len(parts) != 1:
+        raise OutputError(Problem(f"has {len(parts)} parts, expected an image of one part", file=str(path)))
+    return parts[0]
+
+
+def read_header(path: Path) -> Image:
+    """Everything of the first part but its pixels (`channels` is empty); errors as for `read_parts`."""
+    return _image(_read_headers(path)[0], {})
+
+
+def _read_headers(path: Path) -> list[Mapping[str, Any]]:
+    """Headers of the parts of a file whose structure is whole."""
+    try:
+        fault = exr_fault(path)
+    except OSError as error:
+        raise OutputError(Problem(f"cannot be read: {error.strerror}", file=str(path))) from error
+    if fault:
+        raise OutputError(Problem(fault, file=str(path)))
+    return [part.header for part in _open(path, header_only=True).parts]
+
+
+def _open(path: Path, **how: bool) -> Any:
+    try:
+        return OpenEXR.File(str(path), **how)
+    except RuntimeError as error:
+        raise OutputError(Problem(f"cannot be read: {error}", file=str(path))) from error
+
+
+def _image(header: Mapping[str, Any], channels: Mapping[str, Any]) -> Image:
+    compression = next(name for name, value in compressions().items() if value == header["compression"])
+    return Image(
+        channels={name: channels[name].pixels for name in sorted(channels)},
+        attributes={name: header[name] for name in sorted(header) if name not in _STRUCTURE},
+        compression=compression,
+        data_window=_window(header["dataWindow"]),
+        display_window=_window(header["displayWindow"]),
+        name=header.get("name", ""),
+    )
+
+
+def _window(corners: Any) -> Window:
+    (x0, y0), (x1, y1) = corners
+    return (int(x0), int(y0)), (int(x1), int(y1))
+
+
+def is_complete(path: Path, job_sha: str, frame: int) -> bool:
+    """Whether `path` is a whole image of this `frame` made by the job with that hash.
+
+    The structure of the file is checked to its last byte; no pixel is decoded.
+    """
+    try:
+        attributes = read_header(path).attributes
+    except OutputError:
+        return False
+    return attributes.get("quilt:job") == job_sha and attributes.get("quilt:frame") == frame
+
+
+def frame_attributes(viewer: Viewer, fps: Fraction, job_sha: str, version: str) -> dict[str, object]:
+    """Attributes of every file of a frame: when, from where, by which job and program."""
+    return {
+        "framesPerSecond": Fraction(fps),
+        "quilt:frame": int(viewer.frame),
+        "quilt:eye": np.asarray(viewer.eye, dtype=np.float32),
+        "quilt:look": np.asarray(viewer.look, dtype=np.float32),
+        "quilt:up": np.asarray(viewer.up, dtype=np.float32),
+        "quilt:near": float(viewer.near),
+        "quilt:far": float(viewer.far),
+        "quilt:depth": viewer.depth,
+        "quilt:job": job_sha,
+        "quilt:version": version,
+    }
+
+
+def facet_attributes(facet_id: int, facet_from_world: FloatArray) -> dict[str, object]:
+    """What a facet image adds: its 1-based id and its (3, 4) map, written so that it reads back exactly."""
+    numbers = " ".join(repr(float(number)) for number in np.asarray(facet_from_world).reshape(12))
+    return {"quilt:facet": int(facet_id), "quilt:facet_from_world": numbers}
+
+
+def frame_digits(frame: int) -> str:
+    """A frame number as it ends a file name: a sign if negative, then four digits or more."""
+    return f"{'-' if frame < 0 else ''}{abs(frame):04d}"
+
+
+def quilt_path(out: Path, page: int, frame: int) -> Path:
+    """The file of a quilt's page (1-based) in a frame."""
+    return Path(out) / "quilt" / f"page_{page:02d}.{frame_digits(frame)}.exr"
+
+
+def facet_path(out: Path, facet_id: int, frame: int) -> Path:
+    """The file of a facet's image (1-based id) in a frame."""
+    return Path(out) / "facets" / f"facet_{facet_id:04d}.{frame_digits(frame)}.exr"
+
+
+def numbers_in_name(path: Path) -> tuple[str, int, int] | None:
+    """Kind (`page`, `facet`), number and frame of a file named like the above; None of any other."""
+    match = _NAME.fullmatch(path.name)
+    return (match["kind"], int(match["number"]), int(match["frame"])) if match else None

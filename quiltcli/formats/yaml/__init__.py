@@ -1,0 +1,1 @@
+"""YAML read strictly, every value with the place it stands at."""

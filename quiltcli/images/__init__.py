@@ -1,0 +1,1 @@
+"""Pages and facet images: arrays and single files."""

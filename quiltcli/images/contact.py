@@ -1,0 +1,121 @@
+"""Contact sheets: all images of a render side by side, small, each with its name.
+
+Thumbnails are means of whole pixels, labels are drawn dot by dot: a sheet is the same on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from quiltcli.errors import OutputError, Problem
+from quiltcli.formats.drawing.font import HEIGHT, text_mask, text_width
+from quiltcli.formats.exr.image import facet_path, numbers_in_name, quilt_path
+from quiltcli.images.preview import Bytes, Look, display_values, image_colors, scaled_down, write_values
+from quiltcli.job.frames import format_frames
+
+MOST = 2000
+"""Images a sheet takes: more are neither seen nor soon read."""
+_GAP = 8
+_PAPER, _INK = 34, 190
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What a contact sheet shows, and how.
+
+    Attributes:
+        kind: `page` or `facet`; None for pages, or facets where there are no pages.
+        frames: frame numbers; None for all, or the first alone where facets are shown.
+        columns: images in a row; None for as many as make the sheet about 3 : 2.
+        width: of a thumbnail's cell, pixels.
+        look: how light becomes colour.
+    """
+
+    kind: str | None = None
+    frames: Sequence[int] | None = None
+    columns: int | None = None
+    width: int = 240
+    look: Look = field(default_factory=Look)
+
+
+def contact_sheet(out: Path, picture: Path, sheet: Sheet | None = None) -> tuple[int, tuple[int, int]]:
+    """Draw a contact sheet of a render's output folder.
+
+    Returns:
+        The number of images, and the sheet's width and height in pixels.
+
+    Raises:
+        OutputError: there are no such images, or too many, or they cannot be read or the sheet written.
+    """
+    sheet = sheet or Sheet()
+    images = chosen_images(out, sheet)
+    cells = [_thumbnail(path, sheet) for _, path in images]
+    pixels = _laid_out(cells, [label for label, _ in images], sheet)
+    write_values(picture, pixels, sheet.look.view)
+    return len(images), (pixels.shape[1], pixels.shape[0])
+
+
+def chosen_images(out: Path, sheet: Sheet) -> list[tuple[str, Path]]:
+    """Label and file of every image on the sheet, by frame, then by page or facet (OutputError)."""
+    known = sorted(_images(out))
+    kind = sheet.kind or ("page" if any(found[0] == "page" for found in known) else "facet")
+    known = [found for found in known if found[0] == kind]
+    if not known:
+        wrong = f"has no images of {kind}s (expected the folder that quilt render has written to)"
+        raise OutputError(Problem(wrong, file=str(out)))
+    there = sorted({frame for _, frame, _ in known})
+    wanted = set((there if kind == "page" else there[:1]) if sheet.frames is None else sheet.frames)
+    if missing := sorted(wanted - set(there)):
+        wrong = f"has no {kind}s of frame {missing[0]} (it has {format_frames(there)})"
+        raise OutputError(Problem(wrong, file=str(out)))
+    path_of = quilt_path if kind == "page" else facet_path
+    found = [
+        (f"{kind} {number}, frame {frame}", path_of(out, number, frame))
+        for _, frame, number in known
+        if frame in wanted
+    ]
+    if len(found) > MOST:
+        raise OutputError(
+            Problem(f"has {len(found)} such images, more than {MOST} (choose frames)", str(out))
+        )
+    return found
+
+
+def _images(out: Path) -> Iterator[tuple[str, int, int]]:
+    """Kind, frame and number of every image of a folder."""
+    for path in (*out.glob("quilt/page_*.exr"), *out.glob("facets/facet_*.exr")):
+        if found := numbers_in_name(path):
+            kind, number, frame = found
+            yield kind, frame, number
+
+
+def _thumbnail(path: Path, sheet: Sheet) -> Bytes:
+    """An image, small enough for a cell that is as high as it is wide."""
+    return display_values(scaled_down(image_colors(path), sheet.width), sheet.look).astype(np.uint8)
+
+
+def _laid_out(cells: Sequence[Bytes], labels: Sequence[str], sheet: Sheet) -> Bytes:
+    """The sheet's pixels (H, W, 3)."""
+    wide = max(*(cell.shape[1] for cell in cells), *(text_width(label) for label in labels))
+    high = max(cell.shape[0] for cell in cells) + _GAP + HEIGHT
+    columns = sheet.columns or math.ceil(math.sqrt(len(cells) * 1.5 * high / wide))
+    columns = min(columns, len(cells))
+    rows = -(-len(cells) // columns)
+    shape = (_GAP + rows * (high + 2 * _GAP), _GAP + columns * (wide + _GAP), 3)
+    pixels = np.full(shape, _PAPER, dtype=np.uint8)
+    for at, (cell, label) in enumerate(zip(cells, labels, strict=True)):
+        row, column = divmod(at, columns)
+        top, left = _GAP + row * (high + 2 * _GAP), _GAP + column * (wide + _GAP)
+        # Images stand on one line, above their names.
+        foot = top + high - _GAP - HEIGHT
+        side = left + (wide - cell.shape[1]) // 2
+        pixels[foot - cell.shape[0] : foot, side : side + cell.shape[1]] = cell
+        mask = text_mask(label)
+        side = left + (wide - mask.shape[1]) // 2
+        pixels[foot + _GAP : foot + _GAP + HEIGHT, side : side + mask.shape[1]][mask] = _INK
+    return pixels

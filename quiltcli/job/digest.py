@@ -1,0 +1,99 @@
+"""The hash of all that makes a job's pixels, so that a finished frame can be told from a stale one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from quiltcli.job.dump import plain
+from quiltcli.job.job import JobFile
+from quiltcli.job.layout import PackSpec
+from quiltcli.job.load import load_display_file, load_layout_file, load_scene_file
+from quiltcli.job.model import YAMLS
+
+
+def job_sha256(job: JobFile) -> str:
+    """Hash of what makes the pixels of a job's frames, hexadecimal.
+
+    Files count by their contents, not by their names: a moved folder keeps its hash and an edited
+    mesh changes it. Which frames are rendered, where to, whether as quilts or facet images, and what
+    becomes of facets that are not lit, makes no difference to any pixel and is left out.
+    """
+    data = plain(job, file_sha256)
+    data["display"] = plain(load_display_file(job.display), file_sha256)
+    data["scene"] = plain(load_scene_file(job.scene), file_sha256)
+    if isinstance(job.layout, Path):
+        data["layout"] = _places(job.layout)
+    elif isinstance(job.layout, PackSpec) and job.layout.pins is not None:
+        data["layout"]["pins"] = _places(job.layout.pins)
+    del data["frames"]
+    data["output"] = {key: data["output"][key] for key in ("channels", "compression", "data_window")}
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _places(layout: Path) -> dict[str, Any]:
+    """What counts of a layout file: not its display, which counts already, nor the text it was found by."""
+    data = plain(load_layout_file(layout), str)
+    return {key: data[key] for key in ("pages", "facets", "padding")}
+
+
+def file_sha256(path: Path) -> str:
+    """Hash of a file's bytes and of the files it draws in (materials, buffers, pictures)."""
+    if path.suffix.lower() in YAMLS or not path.is_file():
+        return ""
+    total = hashlib.sha256()
+    for part in (path, *sorted(set(_drawn_in(path)))):
+        digest = _sha256(part) if part.is_file() else b""
+        total.update(digest)
+    return total.hexdigest()
+
+
+def _sha256(path: Path) -> bytes:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").digest()
+
+
+def _drawn_in(path: Path) -> Iterator[Path]:
+    """Files that a mesh file names."""
+    suffix = path.suffix.lower()
+    if suffix == ".gltf":
+        yield from (path.parent / unquote(uri) for uri in _uris(_json(path)) if not uri.startswith("data:"))
+    if suffix == ".obj":
+        for name in _named(path, rb"mtllib"):
+            yield path.parent / name
+            if (path.parent / name).is_file():
+                yield from (
+                    path.parent / picture for picture in _named(path.parent / name, rb"map_\w+|bump|norm")
+                )
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_bytes())
+    except ValueError:
+        return None
+
+
+def _uris(data: Any) -> Iterator[str]:
+    """Every `uri` of a glTF document."""
+    if not isinstance(data, dict):
+        return
+    for kind in ("buffers", "images"):
+        items = data.get(kind)
+        for item in items if isinstance(items, list) else ():
+            if isinstance(item, dict) and isinstance(item.get("uri"), str):
+                yield item["uri"]
+
+
+def _named(path: Path, words: bytes) -> Iterator[str]:
+    """Last word of every line that starts with one of some words."""
+    for match in re.finditer(
+        rb"^[ \t]*(?:" + words + rb")[ \t]+(.*?)[ \t\r]*$", path.read_bytes(), re.MULTILINE
+    ):
+        yield match[1].split()[-1].decode("utf-8", "replace") if match[1].split() else ""

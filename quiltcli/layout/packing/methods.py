@@ -1,0 +1,40 @@
+"""The table of packing methods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from quiltcli.layout.packing.attempt import Attempt, Method
+from quiltcli.layout.packing.model import PackInput
+from quiltcli.layout.packing.outlines.nest import nest_attempts
+from quiltcli.layout.packing.outlines.sparrow import sparrow_attempts
+from quiltcli.layout.packing.rectangles.rects import maxrects_attempts, rects_attempts, rows_attempts
+from quiltcli.layout.packing.unfolding.net import net_attempts
+
+_SPARSE = 0.7  # of its rectangles a display must fill for rectangles to have a chance
+
+
+def _auto(wanted: PackInput, seconds: float) -> list[list[Attempt]]:
+    """All that `rects` and `nest` do; rectangles only for facets that nearly fill theirs."""
+    rects, nest = rects_attempts(wanted, seconds), nest_attempts(wanted, seconds)
+    return [nest] if nest[0].area <= _SPARSE * rects[0].area else [rects, nest]
+
+
+def _alone(attempts: Callable[[PackInput, float], list[Attempt]]) -> Method:
+    """A method of one list."""
+    return lambda wanted, seconds: [attempts(wanted, seconds)]
+
+
+METHODS: Mapping[str, Method] = {
+    "auto": _auto,
+    "rows": _alone(rows_attempts),
+    "rects": _alone(rects_attempts),
+    "maxrects": _alone(maxrects_attempts),
+    "nest": _alone(nest_attempts),
+    "net": _alone(net_attempts),
+    "sparrow": lambda wanted, seconds: [*_auto(wanted, seconds), sparrow_attempts(wanted, seconds)],
+}
+STEADY = tuple(name for name in METHODS if name != "sparrow")
+"""Methods that give the same layout every time: they read no clock."""
+
+DEFAULT_METHOD = "auto"

@@ -1,0 +1,1 @@
+"""Packing by outlines, which interlock."""

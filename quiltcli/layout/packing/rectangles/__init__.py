@@ -1,0 +1,1 @@
+"""Packing by bounding rectangles."""

@@ -1,0 +1,1 @@
+"""Packing that keeps neighbours together: nets."""

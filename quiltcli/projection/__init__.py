@@ -1,0 +1,1 @@
+"""Pixel to ray and back, one file a kind."""

@@ -1,0 +1,132 @@
+"""One batch of a frame: rasterize its blocks, shade what they see and write it into the buffers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from quiltcli.geometry import BoolArray
+from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
+from quiltcli.render.setup import Stage
+from quiltcli.shading.adaptive import NodeShader, pixel_colors
+from quiltcli.shading.aovs import fill, wanted_for
+from quiltcli.shading.shade import MOST_HALF, shading_wants
+from quiltcli.visibility.draw import Drawing, Frame, Hits, draw, rasterize
+from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What has been drawn of a batch.
+
+    Attributes:
+        visible: how many pixels of facets, bleed left out, show the scene.
+        tiles: (m,) microtiles of the batch's blocks that have pixels that do.
+    """
+
+    visible: int
+    tiles: BoolArray
+
+
+def draw_batch(
+    stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, stale: BoolArray
+) -> Drawn:
+    """Draw one batch into the buffers; its pixels belong to no other batch.
+
+    Args:
+        stage: what the job's frames share.
+        frame: the frame.
+        batch: the range of blocks.
+        buffers: written to.
+        stale: (m,) microtiles of these blocks that still hold another frame and have to be emptied where
+            nothing is seen.
+    """
+    frame = ordered(stage, frame)
+    block = np.arange(*batch)
+    lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers)
+    channels = stage.job.output.channels
+    samples = stage.job.render.samples
+    if samples > 1:
+        draw_samples(stage, frame, batch, buffers, samples)
+        channels = tuple(name for name in channels if name != "rgba")
+    wanted = wanted_for(channels, stage.scene)
+    if frame.order is not None:
+        wanted = replace(wanted, position=True)
+    visible, first = 0, stage.blocks.tiles(batch).start
+    drawing = draw(frame, batch)
+    shader = NodeShader(stage.scene, frame.viewer.eye) if "rgba" in channels else None
+    for hits in drawing.hits(wanted, shader):
+        fill(buffers, channels, stage.scene, frame.viewer, hits)
+        if frame.order is not None:
+            fill_stored(buffers, frame.order, hits)
+        visible += hits.inside
+    if stale.any():
+        empty_missed(stage, drawing, stale, first, buffers)
+    tiles = np.full(stale.size, not mends_itself(stage))
+    tiles[drawing.drawn() - first] = True
+    drawing.done()
+    return Drawn(visible, tiles)
+
+
+def empty_missed(stage: Stage, drawing: Drawing, stale: BoolArray, first: int, buffers: Buffers) -> None:
+    """Empty the pixels at which the drawing shows nothing, in microtiles as `Drawing.missed` is told them."""
+    empty = {name: np.full(1, value, buffers[name].dtype) for name, value in empty_values(stage).items()}
+    for places in drawing.missed(stale, first):
+        for name, value in empty.items():
+            places.put(buffers[name], value)
+
+
+def ordered(stage: Stage, frame: Frame) -> Frame:
+    """The frame with the depth buffer the job asks for; as it is where depth is exact."""
+    how = stage.job.render
+    if how.method == "homography" and how.depth_bits is None:
+        return frame
+    return replace(
+        frame, order=depth_order(how.method, how.depth_bits, frame.viewer, stage.facets, frame.rays)
+    )
+
+
+def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits) -> None:
+    """Write into `zv` what the depth buffer holds, and into `Z` the depth that it is taken for."""
+    wanted = [name for name in ("zv", "Z") if name in buffers]
+    if wanted:
+        assert hits.position is not None
+        stored = dict(zip(("zv", "Z"), order.stored(hits.facet, hits.position), strict=True))
+        for name in wanted:
+            hits.put(buffers[name], stored[name])
+
+
+def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, samples: int) -> None:
+    """Average the colour of several samples a pixel; what misses the scene counts as background."""
+    found = []
+    scene, eye = stage.scene, frame.viewer.eye
+    for sample in sample_places(samples):
+        for hits in rasterize(frame, batch, sample, shading_wants(scene), NodeShader(scene, eye)):
+            rgba = np.ones((4, hits.depth.size), dtype=np.float32)
+            colors = pixel_colors(scene, eye, hits)
+            for color, mine in zip(colors * (3 // len(colors)), rgba, strict=False):
+                np.minimum(color, MOST_HALF, out=mine.reshape(hits.depth.shape))
+            found.append((hits.pixel, np.stack([hits.drawn(c.reshape(hits.depth.shape)) for c in rgba])))
+    if not found or "rgba" not in stage.job.output.channels:
+        return
+    pixel = np.concatenate([p for p, _ in found])
+    order = np.argsort(pixel, kind="stable")
+    pixel = pixel[order]
+    first = np.flatnonzero(np.diff(pixel, prepend=-1))
+    sums = np.add.reduceat(np.concatenate([v for _, v in found], axis=1)[:, order], first, axis=1)
+    sums[:3] += (samples - sums[3]) * stage.scene.background[:, None]
+    for name, values in zip("RGBA", sums / np.float32(samples), strict=True):
+        buffers[name][pixel[first]] = np.minimum(values, MOST_HALF).astype(np.float16)
+
+
+def sample_places(samples: int) -> list[tuple[float, float]]:
+    """Places of the samples in a pixel, from its centre: Hammersley points, the same in every pixel."""
+    places = []
+    for i in range(samples):
+        reverse, step, rest = 0.0, 0.5, i
+        while rest:
+            reverse += step * (rest & 1)
+            step, rest = step / 2, rest >> 1
+        places.append(((i + 0.5) / samples - 0.5, reverse + 0.5 / samples - 0.5))
+    return places

@@ -1,0 +1,66 @@
+"""The buffers of a quilt, and what they hold where nothing is seen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.render.setup import Stage
+from quiltcli.shading.aovs import empty_buffers, exr_channels
+from quiltcli.visibility.draw import block_window
+
+Buffers = dict[str, NDArray[Any]]
+
+
+def new_buffers(stage: Stage) -> Buffers:
+    """Flat buffers of every channel the job asks for, over all pages."""
+    return empty_buffers(stage.job.output.channels, stage.owners.size)
+
+
+def clear(stage: Stage, buffers: Buffers, only: BoolArray | None) -> None:
+    """Empty the pixels of the facets in `only`, or everything."""
+    mine = slice(None) if only is None else np.concatenate(([False], only))[np.abs(stage.owners)]
+    for name, value in empty_values(stage).items():
+        buffers[name][mine] = value
+
+
+def clear_blocks(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
+    """Empty the pixels of the blocks with these indices."""
+    empty = empty_values(stage)
+    for block in blocks.tolist():
+        for name, value in empty.items():
+            block_window(buffers[name], stage.blocks, block).fill(value)
+
+
+def empty_values(stage: Stage) -> dict[str, float]:
+    """What every buffer holds where nothing is seen."""
+    return {name: value for name, (_, value) in exr_channels(stage.job.output.channels).items()}
+
+
+def has_background(stage: Stage) -> bool:
+    """Whether pixels that do not see the scene have a colour."""
+    return "rgba" in stage.job.output.channels and bool(stage.scene.background.any())
+
+
+def mends_itself(stage: Stage) -> bool:
+    """Whether drawing a batch may empty what it does not fill, which is less to write.
+
+    Not with a background, which lies under everything, nor with several samples a pixel, which see more.
+    """
+    return not has_background(stage) and stage.job.render.samples == 1
+
+
+def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
+    """Give the pixels of these blocks that their facets own the background's colour, if there is one."""
+    if not has_background(stage):
+        return
+    for block in blocks.tolist():
+        owner = block_window(stage.owners, stage.blocks, block)
+        facet = int(stage.blocks.facet[block]) + 1
+        mine = (owner == facet) | (owner == -facet)
+        for name, value in zip("RGB", stage.scene.background, strict=True):
+            pixels = block_window(buffers[name], stage.blocks, block)
+            np.copyto(pixels, value, where=mine, casting="same_kind")

@@ -1,0 +1,167 @@
+"""Ray casting: one ray a pixel, cast with Embree and settled in double precision; exact and slow.
+
+Embree's rays are single precision: near an edge they may name the neighbour, and of two surfaces a
+millionth of their distance apart the farther one. So five rays are cast around every pixel's sample,
+and one from just behind the hit back to the eye. Where all six name one triangle, that is it; for the
+other pixels all triangles that were named, and those that touch them, are met in float64, and the
+nearest is taken. Nothing of binning and rasterization takes part.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from quiltcli.display import lit_facets
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
+from quiltcli.projection.planar import quilt_rays
+from quiltcli.render.buffers import Buffers, clear, lay_background
+from quiltcli.render.report import FrameRecord
+from quiltcli.render.setup import Stage
+from quiltcli.shading.aovs import fill
+from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.draw import Hits
+from quiltcli.visibility.rays.embree import Target, aim, cast, plane_depth, plane_distance
+from quiltcli.visibility.rays.exact import Neighbours, intersect
+from quiltcli.visibility.rays.pixels import OFFSETS, Places, places
+from quiltcli.visibility.resolve.hits import point_hits
+from quiltcli.visibility.setup.planes import LATTICE
+
+_CHUNK = 1 << 15
+_BEHIND = 1e-5  # share of a distance within which a second surface is looked for
+RESOLUTION = 2.0**-30
+"""Share of a depth within which the rasterizer's keys hold two surfaces for as near as each other."""
+
+
+def cast_frame(
+    stage: Stage, viewer: Viewer, buffers: Buffers, threads: int = 1, only: BoolArray | None = None
+) -> FrameRecord:
+    """Draw a frame by casting rays; for the arguments see `draw.draw_frame`.
+
+    Raises:
+        MissingExtraError: there is no Embree on this machine.
+    """
+    begin = time.perf_counter()
+    lit = lit_facets(stage.facets, viewer.eye)
+    if only is not None:
+        lit &= only
+    rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
+    target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
+    neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
+    clear(stage, buffers, only)
+    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers)
+
+    def draw(address: IntArray) -> int:
+        pixels = places(address, stage.layout, stage.owners, rays)
+        hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals)
+        if hits.triangle.size:
+            fill(buffers, stage.job.output.channels, stage.scene, viewer, hits)
+        return hits.inside
+
+    with ThreadPoolExecutor(threads) as pool:
+        visible = sum(pool.map(draw, pixels_of(stage, rays.lit)))
+    return FrameRecord(
+        frame=viewer.frame,
+        triangles=int(np.count_nonzero(target.drawn)),
+        reaching=0,
+        pairs=0,
+        settled=0,
+        lit_facets=int(np.count_nonzero(rays.lit)),
+        visible_pixels=visible,
+        fill=stage.fill,
+        seconds={"cast and shade": time.perf_counter() - begin},
+        warnings=() if visible else ("no pixel shows the scene",),
+    )
+
+
+def pixels_of(stage: Stage, lit: BoolArray) -> Iterator[IntArray]:
+    """Addresses of the pixels of some facets and their bleed, a chunk at a time."""
+    wanted = np.concatenate(([False], lit))
+    for start in range(0, stage.owners.size, _CHUNK):
+        chunk = np.flatnonzero(wanted[np.abs(stage.owners[start : start + _CHUNK])])
+        if chunk.size:
+            yield chunk + start
+
+
+def cast_pixels(target: Target, neighbours: Neighbours, pixels: Places, normals: Float32Array) -> Hits:
+    """What P pixels see; `normals` are the scene's `corner_normals`."""
+    triangle = first_triangles(target, neighbours, pixels)
+    rows = np.flatnonzero(triangle >= 0)
+    triangle = triangle[rows]
+    x, y = (pixels.x[rows] + 0.5)[:, None], (pixels.y[rows] + 0.5)[:, None]
+    matrix = pixels.ray[rows]
+    ray = matrix[:, :, 0] * x + matrix[:, :, 1] * y + matrix[:, :, 2]
+    position = ray * plane_distance(target, triangle, ray)[:, None]
+    points = np.ascontiguousarray(position.T)
+    return point_hits(
+        first=pixels.address[rows],
+        facet=pixels.facet[rows].astype(np.int32),
+        triangle=triangle.astype(np.int32),
+        position=points,
+        weights=np.stack(_weights(target, triangle, position)),
+        depth=target.viewer.depth_of(points),
+        normals=normals,
+        inside=int(np.count_nonzero(~pixels.bleed[rows])),
+    )
+
+
+def _weights(target: Target, triangle: IntArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Barycentric weights (P,) of the second and third corner at points (P, 3) of triangles (P,)."""
+    a, b, c = (target.corners[target.triangles[triangle, k]] for k in range(3))
+    normal = target.plane[triangle, :3]
+    area = dot(normal, normal)
+    second = dot(normal, cross(position - a, c - a)) / area
+    return second, dot(normal, cross(b - a, position - a)) / area
+
+
+def first_triangles(target: Target, neighbours: Neighbours, pixels: Places) -> IntArray:
+    """The first triangle (P,) along the ray of every pixel, −1 for none."""
+    named = np.stack([cast(target, pixels.directions(*offset)) for offset in OFFSETS])
+    back = _looking_back(target, pixels.directions(), named[0])
+    every = np.concatenate((named, back[None]))
+    result: IntArray = np.maximum(named[0], -1)
+    rows = np.flatnonzero((every != every[0]).any(axis=0))
+    if rows.size:
+        result[rows] = _nearest(target, neighbours, pixels, rows, every[:, rows])
+    return result
+
+
+def _looking_back(target: Target, directions: FloatArray, first: IntArray) -> IntArray:
+    """What rays (P, 3) from just behind their first hits (P,) towards the eye meet.
+
+    Where that is nothing, or nothing was hit, it is `first` itself.
+    """
+    result: IntArray = first.copy()
+    rows = np.flatnonzero(first >= 0)
+    if rows.size:
+        distance = plane_distance(target, first[rows], directions[rows]) * (1 + _BEHIND)
+        distance = np.where(np.isfinite(distance), distance, 0.0)
+        origin = (distance[:, None] * directions[rows]).astype(np.float32)
+        met = target.embree.run(origin, (-directions[rows]).astype(np.float32)).astype(np.int64)
+        result[rows[met >= 0]] = target.named[met[met >= 0]]
+    return result
+
+
+def _nearest(
+    target: Target, neighbours: Neighbours, pixels: Places, rows: IntArray, named: IntArray
+) -> IntArray:
+    """The nearest triangle (N,) of those named (k, N), and those that touch them, that the sample lies in.
+
+    Samples lie where the rasterizer's do, so that both decide centres on edges alike; depth is the
+    centre's, and of triangles at one depth the lowest is taken, as there.
+    """
+    which, column = np.nonzero(named.T >= 0)
+    result = np.full(rows.size, -1)
+    around, triangle = neighbours.around(which, named.T[which, column])
+    tests = intersect(target, pixels, rows[around], triangle, LATTICE)
+    depth = plane_depth(target, triangle, pixels.directions()[rows[around]])
+    hit = np.flatnonzero((tests.inside >= 0) & (depth >= target.viewer.near) & (depth <= target.viewer.far))
+    nearest = np.full(rows.size, np.inf)
+    np.minimum.at(nearest, around[hit], depth[hit])
+    first = hit[depth[hit] <= nearest[around[hit]] * (1 + RESOLUTION)]
+    order = first[np.lexsort((tests.triangle[first], around[first]))][::-1]
+    result[around[order]] = tests.triangle[order]  # the last write of a row is its lowest triangle
+    return result

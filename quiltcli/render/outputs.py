@@ -1,0 +1,259 @@
+"""The files of a render: which there will be, which are there already, and how they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quiltcli import __version__
+from quiltcli.display import lit_facets
+from quiltcli.errors import OutputError, Problem, raise_all
+from quiltcli.formats.exr.image import (
+    Channel,
+    facet_attributes,
+    facet_path,
+    frame_attributes,
+    is_complete,
+    quilt_path,
+    read_exr,
+    read_header,
+    write_exr,
+)
+from quiltcli.formats.whole import link_whole, make_folder, remove_file, write_text
+from quiltcli.geometry import IntArray, facet_from_world
+from quiltcli.images.facets import facet_image, page_of
+from quiltcli.images.window import cropped, frame_size, tight_window, whole_frame
+from quiltcli.job import dump_job
+from quiltcli.layout import Layout, write_layout
+from quiltcli.render.buffers import Buffers
+from quiltcli.render.frame import Clock
+from quiltcli.render.setup import Stage
+from quiltcli.viewer.viewer import Viewer, viewer_at
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where a job's files go.
+
+    Attributes:
+        folder: the output folder.
+        job_sha: hash of the job, written into every file.
+        rows: facets whose images are written, indices into the layout.
+    """
+
+    folder: Path
+    job_sha: str
+    rows: IntArray
+
+
+def outputs(stage: Stage, folder: Path, job_sha: str, facet_ids: Iterable[int] | None = None) -> Outputs:
+    """The output of a stage into `folder`, of all placed facets or those with these ids."""
+    placed = stage.layout.page >= 0
+    if facet_ids is not None:
+        placed &= np.isin(stage.layout.facet, list(facet_ids))
+    return Outputs(folder, job_sha, np.flatnonzero(placed))
+
+
+def frame_files(stage: Stage, out: Outputs, frame: int) -> list[Path]:
+    """Every image of one frame."""
+    job = stage.job.output
+    pages = [quilt_path(out.folder, page + 1, frame) for page in range(len(stage.layout.pages))]
+    facets = [facet_path(out.folder, int(stage.layout.facet[row]), frame) for row in out.rows]
+    return pages * job.quilts + facets * job.facets
+
+
+def frame_is_complete(stage: Stage, out: Outputs, frame: int) -> bool:
+    """Whether every image of a frame is there, whole, and made by this job; one to be skipped may lack."""
+    missing = set(_skipped_files(stage, out, frame))
+    return all(
+        is_complete(path, out.job_sha, frame) or (path in missing and not path.exists())
+        for path in frame_files(stage, out, frame)
+    )
+
+
+def _skipped_files(stage: Stage, out: Outputs, frame: int) -> Iterator[Path]:
+    """Images of a frame that are not to be written, for their facets are not lit."""
+    if stage.job.output.facets and stage.job.output.unlit == "skip":
+        eye = viewer_at(stage.job.viewer, frame).eye
+        for row in out.rows[~lit_facets(stage.facets, eye)[out.rows]]:
+            yield facet_path(out.folder, int(stage.layout.facet[row]), frame)
+
+
+def refuse_to_overwrite(stage: Stage, out: Outputs, frames: Iterable[int]) -> None:
+    """Raise OutputError if any image of these frames exists; it names the first and counts the rest."""
+    present = [path for frame in frames for path in frame_files(stage, out, frame) if path.exists()]
+    if present:
+        more = f" and {len(present) - 1} more" if len(present) > 1 else ""
+        message = f"exists already{more} (use --resume to keep finished frames, --overwrite to replace them)"
+        raise OutputError(Problem(message, file=str(present[0])))
+
+
+def write_settings(stage: Stage, out: Outputs) -> None:
+    """Make the folders; write the layout used and the job as resolved."""
+    for name, wanted in (("quilt", stage.job.output.quilts), ("facets", stage.job.output.facets)):
+        if wanted:
+            make_folder(out.folder / name)
+    write_layout(stage.layout, out.folder / "layout.yaml")
+    write_text(out.folder / "job.yaml", dump_job(stage.job, out.folder))
+
+
+def write_frame(
+    stage: Stage, out: Outputs, viewer: Viewer, buffers: Buffers, threads: int
+) -> dict[str, float]:
+    """Write the images of one frame, several files at a time.
+
+    Returns:
+        Seconds by what was done, those of all threads together.
+
+    Raises:
+        OutputError: a file cannot be written; those already written are whole.
+    """
+    attributes = frame_attributes(viewer, stage.job.fps, out.job_sha, __version__)
+    total: dict[str, float] = {}
+    with ThreadPoolExecutor(threads) as pool:
+        work = _work(stage, out, viewer, buffers, attributes)
+        for each in [pool.submit(*task) for task in work]:
+            for name, seconds in each.result().items():
+                total[name] = total.get(name, 0.0) + seconds
+    return total
+
+
+def _work(
+    stage: Stage, out: Outputs, viewer: Viewer, buffers: Buffers, attributes: dict[str, object]
+) -> Iterator[tuple[Any, ...]]:
+    """What there is to do for one frame: functions that give seconds, and their arguments."""
+    how, layout = stage.job.output, stage.layout
+    if how.quilts:
+        for page in range(len(layout.pages)):
+            yield _write_page, stage, out, page, buffers, attributes
+    if not how.facets:
+        return
+    maps = facet_from_world(layout.origin, layout.du, layout.dv)
+    apart = ~lit_facets(stage.facets, viewer.eye)[out.rows] & (how.unlit != "write")
+    for row in out.rows[~apart].tolist():
+        own = attributes | facet_attributes(int(layout.facet[row]), maps[row])
+        yield _write_facet, stage, out, row, buffers, own
+    if apart.any():
+        for rows in _by_size(layout, out.rows[apart]):
+            paths = [facet_path(out.folder, int(layout.facet[row]), viewer.frame) for row in rows]
+            if how.unlit == "skip":
+                yield _remove, paths
+            else:
+                yield _write_links, stage, rows[0], buffers, attributes, paths
+
+
+def _by_size(layout: Layout, rows: IntArray) -> Iterator[list[int]]:
+    """The rows in groups of one raster size."""
+    _, group = np.unique(layout.size[rows], axis=0, return_inverse=True)
+    for number in range(int(group.max()) + 1):
+        yield rows[group.reshape(-1) == number].tolist()
+
+
+def _write_page(
+    stage: Stage, out: Outputs, page: int, buffers: Buffers, attributes: dict[str, object]
+) -> dict[str, float]:
+    """Write one page of the quilt."""
+    clock = Clock()
+    pixels = {name: page_of(flat, stage.layout, page) for name, flat in buffers.items()}
+    path = quilt_path(out.folder, page + 1, int(str(attributes["quilt:frame"])))
+    _write(stage, path, pixels, attributes | {"quilt:page": page + 1}, clock)
+    return clock.seconds
+
+
+def _write_facet(
+    stage: Stage, out: Outputs, row: int, buffers: Buffers, attributes: dict[str, object]
+) -> dict[str, float]:
+    """Write the image of one facet."""
+    clock = Clock()
+    with clock.stage("cut"):
+        pixels = facet_image(buffers, stage.layout, row, stage.owners)
+    path = facet_path(out.folder, int(stage.layout.facet[row]), int(str(attributes["quilt:frame"])))
+    _write(stage, path, pixels, attributes, clock)
+    return clock.seconds
+
+
+def _write_links(
+    stage: Stage, row: int, buffers: Buffers, attributes: dict[str, object], paths: list[Path]
+) -> dict[str, float]:
+    """Write one image for facets of one size that show nothing, and link it to the names of them all."""
+    clock = Clock()
+    with clock.stage("cut"):
+        pixels = facet_image(buffers, stage.layout, row, stage.owners)
+    _write(stage, paths[0], pixels, attributes, clock)
+    with clock.stage("link"):
+        for path in paths[1:]:
+            link_whole(paths[0], path)
+    return clock.seconds
+
+
+def _remove(paths: list[Path]) -> dict[str, float]:
+    """Remove images that an earlier render has left of facets that are now skipped."""
+    clock = Clock()
+    with clock.stage("link"):
+        for path in paths:
+            remove_file(path)
+    return clock.seconds
+
+
+def _write(
+    stage: Stage, path: Path, pixels: dict[str, Channel], attributes: dict[str, object], clock: Clock
+) -> None:
+    """Write one image as the job wants it."""
+    how = stage.job.output
+    height, width = next(iter(pixels.values())).shape
+    frame = window = (0, 0), (width - 1, height - 1)
+    if how.data_window == "tight":
+        with clock.stage("tighten"):
+            window = tight_window(pixels)
+            pixels = cropped(pixels, window)
+    with clock.stage("compress and store"):
+        write_exr(path, pixels, attributes, how.compression, data_window=window, display_window=frame)
+
+
+def merge_problems(stage: Stage, out: Outputs, frames: Iterable[int]) -> list[Problem]:
+    """What keeps facets from being merged into the quilts of these frames."""
+    return [problem for frame in frames for _, problem in _pages_on_disk(stage, out, frame) if problem]
+
+
+def read_quilt(stage: Stage, out: Outputs, frame: int, buffers: Buffers) -> None:
+    """Fill `buffers` with the quilt that is on disk, for facets to be merged into.
+
+    Raises:
+        OutputError: a page is missing, damaged, of another size, has other channels, or another job's.
+    """
+    raise_all(OutputError, merge_problems(stage, out, [frame]))
+    for page in range(len(stage.layout.pages)):
+        path = quilt_path(out.folder, page + 1, frame)
+        image = read_exr(path)
+        if missing := sorted(set(buffers) - set(image.channels)):
+            raise OutputError(Problem(f"lacks the channels {', '.join(missing)}", str(path)))
+        channels = whole_frame(image)
+        for name in buffers:
+            page_of(buffers[name], stage.layout, page)[:] = channels[name]
+
+
+def _pages_on_disk(stage: Stage, out: Outputs, frame: int) -> Iterator[tuple[int, Problem | None]]:
+    """Every page of the frame's quilt, with what is wrong with its file; no pixel is read."""
+    for page, (width, height) in enumerate(stage.layout.pages.tolist()):
+        path = quilt_path(out.folder, page + 1, frame)
+        if not path.exists():
+            yield (
+                page,
+                Problem("no such quilt to merge facets into (render the whole frame first)", str(path)),
+            )
+            continue
+        image = read_header(path)
+        size = frame_size(image)
+        if size != (width, height):
+            words = f"is {size[0]}×{size[1]} pixels, the layout's page is {width}×{height}"
+            yield page, Problem(words, str(path))
+        elif image.attributes.get("quilt:job") != out.job_sha:
+            words = "was made by another job; facets can only be merged into the same job's"
+            yield page, Problem(words, str(path))
+        else:
+            yield page, None

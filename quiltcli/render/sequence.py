@@ -1,0 +1,282 @@
+"""The walk from a job to its images.
+
+job → display, layout, scene            once (`draw.set_stage`)
+frame → viewer                          a function of the frame number
+    bin, prewarp, rasterize, shade      `draw.draw_frame`, or another of `methods`
+    unmap, write                        `outputs.write_frame`
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from quiltcli import __version__
+from quiltcli.display import pitch_mm
+from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, raise_all
+from quiltcli.formats.exr.image import use_threads
+from quiltcli.geometry import BoolArray
+from quiltcli.job import JobFile, job_sha256
+from quiltcli.render.buffers import Buffers, new_buffers
+from quiltcli.render.frame import default_threads
+from quiltcli.render.interrupt import stop_between_frames
+from quiltcli.render.methods import draw_frame
+from quiltcli.render.outputs import (
+    Outputs,
+    frame_is_complete,
+    merge_problems,
+    outputs,
+    read_quilt,
+    refuse_to_overwrite,
+    write_frame,
+    write_settings,
+)
+from quiltcli.render.report import FrameRecord, write_report
+from quiltcli.render.setup import Stage, set_stage
+from quiltcli.render.workers import Pool, can_fork, shared_buffers, worth_forking
+from quiltcli.viewer.edge_on import eye_problems
+from quiltcli.viewer.viewer import Viewer, check_viewer, viewer_at
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """What the command line says beside the job.
+
+    Attributes:
+        frames: frames to render instead of the job's.
+        folder: output folder instead of the job's.
+        resume: skip frames that are complete and made by the same job.
+        overwrite: replace images that exist.
+        facets: ids of the only facets to draw, merged into the quilts that exist.
+        threads: batches and files worked on at a time; 0 takes every core.
+        dry_run: find every problem, write nothing.
+    """
+
+    frames: Sequence[int] | None = None
+    folder: Path | None = None
+    resume: bool = False
+    overwrite: bool = False
+    facets: Sequence[int] | None = None
+    threads: int = 0
+    dry_run: bool = False
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Whom a render tells of its progress.
+
+    Attributes:
+        begin: the number of frames that will be rendered.
+        frame_done: the record of a frame whose files are all written.
+        say: a sentence for the user.
+    """
+
+    begin: Callable[[int], None] = lambda count: None
+    frame_done: Callable[[FrameRecord], None] = lambda record: None
+    say: Callable[[str], None] = lambda sentence: None
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A job with every problem found and nothing written yet.
+
+    Attributes:
+        stage: what the frames share.
+        out: where the files go.
+        viewers: the viewers of the frames that are left to draw.
+        only: (F,) the only facets to draw, None for all.
+    """
+
+    stage: Stage
+    out: Outputs
+    viewers: tuple[Viewer, ...]
+    only: BoolArray | None
+
+
+def render(
+    job: JobFile, options: RenderOptions | None = None, listener: Listener | None = None
+) -> list[FrameRecord]:
+    """Render the frames of a job: quilts, facet images, report.
+
+    Args:
+        job: the job.
+        options: what the command line says beside it.
+        listener: told of notices and of every finished frame.
+
+    Returns:
+        The records of the frames that were rendered.
+
+    Raises:
+        QuiltError: bad input, found before anything is written, or a file that cannot be written.
+        Stopped: a signal came; the frames rendered so far are whole and reported.
+    """
+    options, listener = options or RenderOptions(), listener or Listener()
+    start = time.perf_counter()
+    ready = prepare(job, options)
+    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
+        listener.say(notice)
+    if options.dry_run or not ready.viewers:
+        return []
+    write_settings(ready.stage, ready.out)
+    return render_frames(ready, options.threads or default_threads(), listener, start)
+
+
+def prepare(job: JobFile, options: RenderOptions) -> Prepared:
+    """Load what a job names, and find every reason not to render it.
+
+    Raises:
+        QuiltError: bad input, or files that are in the way.
+    """
+    frames = list(job.frames if options.frames is None else options.frames)
+    viewers = viewer_path(job, frames)
+    stage = set_stage(job)
+    raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
+    only = chosen_facets(stage, options.facets)
+    out = outputs(stage, options.folder or job.output.directory, job_sha256(job), options.facets)
+    if only is not None:
+        raise_all(OutputError, merge_problems(stage, out, frames))
+    elif options.resume:
+        viewers = [viewer for viewer in viewers if not frame_is_complete(stage, out, viewer.frame)]
+    elif not options.overwrite:
+        refuse_to_overwrite(stage, out, frames)
+    return Prepared(stage, out, tuple(viewers), only)
+
+
+def render_frames(
+    ready: Prepared, threads: int, listener: Listener, start: float | None = None
+) -> list[FrameRecord]:
+    """Draw and write the frames; while one is written, the next is drawn into other buffers.
+
+    Args:
+        ready: what to draw.
+        threads: batches and files worked on at a time.
+        listener: told of every finished frame.
+        start: when the run began, by `time.perf_counter`; None for now.
+    """
+    stage, viewers = ready.stage, ready.viewers
+    pooled = threads > 1 and can_fork() and worth_forking(stage)
+    sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in viewers[:2]]
+    # Forked before this process has threads of its own: a lock that one holds would stay locked.
+    with ExitStack() as ends:
+        pool = ends.enter_context(Pool(stage, sheets, threads)) if pooled else None
+        listener.begin(len(viewers))
+        request = ends.enter_context(stop_between_frames())
+        writer = ends.enter_context(Writer(ready, threads, listener, start))
+        dirty = [np.zeros(stage.blocks.used.size, dtype=np.bool_) for _ in sheets]
+        for number, viewer in enumerate(viewers):
+            request.check()
+            turn = number % len(sheets)
+            writer.leave(len(sheets) - 1)
+            if ready.only is not None:
+                read_quilt(stage, ready.out, viewer.frame, sheets[turn])
+            record = draw_frame(
+                stage, viewer, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool
+            )
+            writer.take(record, viewer, sheets[turn])
+        writer.leave(0)
+        request.check()
+    return writer.records
+
+
+class Writer:
+    """Writes frames behind the drawing, in order; a context manager that leaves no frame unwritten.
+
+    Attributes:
+        records: of the frames whose files are all there.
+    """
+
+    def __init__(self, ready: Prepared, threads: int, listener: Listener, start: float | None = None) -> None:
+        now = time.perf_counter()
+        self._done = now if start is None else start  # when the frame before was
+        self._load = now - self._done
+        use_threads(threads)
+        self.records: list[FrameRecord] = []
+        self._ready = ready
+        self._threads = threads
+        self._listener = listener
+        self._executor = ThreadPoolExecutor(1)
+        self._waiting: deque[Future[FrameRecord]] = deque()
+
+    def __enter__(self) -> Writer:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        try:
+            while self._waiting:
+                # After a first error the frames behind it are still finished; it is the one that is told.
+                with suppress(*(QuiltError,) if kind else ()):
+                    self.leave(len(self._waiting) - 1)
+        finally:
+            self._executor.shutdown()
+
+    def take(self, record: FrameRecord, viewer: Viewer, buffers: Buffers) -> None:
+        """Write a frame; its buffers must not change until `leave` has let it go."""
+        stage, out = self._ready.stage, self._ready.out
+        work = partial(write_frame, stage, out, viewer, buffers, self._threads)
+        record = record.after("load", self._load)
+        self._load = 0.0
+        self._waiting.append(self._executor.submit(record.written, work))
+
+    def leave(self, count: int) -> None:
+        """Wait until at most `count` frames are unwritten; report those that are."""
+        while len(self._waiting) > count:
+            start = time.perf_counter()
+            record = self._waiting.popleft().result()
+            now = time.perf_counter()
+            record = record.done(waited=now - start, wall=now - self._done)
+            self._done = now
+            self.records.append(record)
+            out = self._ready.out
+            write_report(out.folder / "report.json", out.job_sha, __version__, [record])
+            self._listener.frame_done(record)
+
+
+def viewer_path(job: JobFile, frames: Sequence[int]) -> list[Viewer]:
+    """The viewer of every frame.
+
+    Raises:
+        ViewerError: with every problem of the path.
+    """
+    raise_all(ViewerError, check_viewer(job.viewer, frames))
+    return [viewer_at(job.viewer, frame, job.render.depth) for frame in frames]
+
+
+def chosen_facets(stage: Stage, ids: Sequence[int] | None) -> BoolArray | None:
+    """The facets (F,) with these ids, None for all.
+
+    Raises:
+        JobError: the display has no such facet, or it has no place in the layout.
+    """
+    if ids is None:
+        return None
+    chosen = np.zeros(stage.facets.count, dtype=np.bool_)
+    for facet in ids:
+        if not 1 <= facet <= stage.facets.count:
+            raise JobError(f"--facets: there is no facet {facet} (the display has 1 to {stage.facets.count})")
+        if stage.layout.page[facet - 1] < 0:
+            raise JobError(f"--facets: facet {facet} is not enabled and has no place in the layout")
+        chosen[facet - 1] = True
+    return chosen
+
+
+def stage_warnings(stage: Stage) -> Iterator[str]:
+    """What is worth a second look before rendering starts."""
+    least, greatest = pitch_mm(stage.facets)
+    if least < 0.1 or greatest > 100:
+        yield (
+            f"the pixel pitch is {least:.3g} to {greatest:.3g} mm, outside 0.1 to 100 mm:"
+            " are the display's units and resolution right?"
+        )
+    if stage.job.render.bleed > stage.layout.padding:
+        yield (
+            f"the bleed of {stage.job.render.bleed} pixels is wider than the layout's padding of"
+            f" {stage.layout.padding}: neighbours share what lies between them"
+        )

@@ -1,0 +1,66 @@
+"""The stage: what the viewer cannot change, set up once a job."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.display import Facets, load_display
+from quiltcli.geometry import OwnerArray
+from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
+from quiltcli.layout import Layout, pixel_owners
+from quiltcli.layout.packing import layout_for
+from quiltcli.scene import Scene, load_scene
+from quiltcli.visibility.binning.pairs import Parts, facet_parts
+from quiltcli.visibility.draw import Blocks, cut_blocks
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What the viewer cannot change: everything above the loop over frames.
+
+    Attributes:
+        job: the job.
+        facets: the display, with the rasters the layout was made for.
+        layout: the facets' places, one row a facet.
+        scene: the scene.
+        parts: convex pieces of the facets.
+        blocks: the facets' rectangles, cut for the rasterizer.
+        owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
+        fill: share of the quilt's pixels that lie in facets.
+    """
+
+    job: JobFile
+    facets: Facets
+    layout: Layout
+    scene: Scene
+    parts: Parts
+    blocks: Blocks
+    owners: OwnerArray
+    fill: float
+
+
+def set_stage(job: JobFile) -> Stage:
+    """Load everything a job names and prepare what all of its frames share.
+
+    Raises:
+        QuiltError: a file is wrong, or the layout does not belong to the display.
+    """
+    facets, layout = layout_for(job.layout or PackSpec(), load_display(load_display_file(job.display)))
+    return stage_of(job, facets, layout, load_scene(load_scene_file(job.scene)), job.render.bleed)
+
+
+def stage_of(job: JobFile, facets: Facets, layout: Layout, scene: Scene, bleed: int) -> Stage:
+    """The stage of a display, its layout and a scene that are already there."""
+    owners = pixel_owners(layout, bleed)
+    return Stage(
+        job=job,
+        facets=facets,
+        layout=layout,
+        scene=scene,
+        parts=facet_parts(facets, layout, bleed),
+        blocks=cut_blocks(layout, bleed, owners),
+        owners=owners,
+        fill=np.count_nonzero(owners > 0) / owners.size,
+    )

@@ -1,0 +1,1 @@
+"""Meshes of scene objects, by file format."""

@@ -1,0 +1,49 @@
+"""What a surface is made of, and the table a scene keeps of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from quiltcli.scene.scene import Materials
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One material; equal surfaces share a row of the scene's table.
+
+    Attributes:
+        color: base colour, linear.
+        metallic: 0 to 1.
+        roughness: 0 to 1.
+        emission: emitted radiance, linear.
+        unlit: shows exactly `color`.
+        specular: 0 to 1, strength of the layer that reflects; metals reflect all the same.
+    """
+
+    color: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    metallic: float = 0.0
+    roughness: float = 0.5
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    unlit: bool = False
+    specular: float = 1.0
+
+    def overridden(self, given: Mapping[str, Any]) -> Surface:
+        """This surface with the keys of `given` in place of its own."""
+        changes: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
+        return replace(self, **changes)
+
+
+def material_table(surfaces: Sequence[Surface]) -> Materials:
+    """The table of M surfaces, one row each, in float32."""
+    return Materials(
+        color=np.array([s.color for s in surfaces], dtype=np.float32).reshape(-1, 3),
+        metallic=np.array([s.metallic for s in surfaces], dtype=np.float32),
+        roughness=np.array([s.roughness for s in surfaces], dtype=np.float32),
+        emission=np.array([s.emission for s in surfaces], dtype=np.float32).reshape(-1, 3),
+        unlit=np.array([s.unlit for s in surfaces], dtype=np.bool_),
+        specular=np.array([s.specular for s in surfaces], dtype=np.float32),
+    )

@@ -1,0 +1,1 @@
+"""The light that leaves visible points towards the eye."""

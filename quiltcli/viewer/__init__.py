@@ -1,0 +1,1 @@
+"""Where the viewer's eye is in a frame, and where it looks."""

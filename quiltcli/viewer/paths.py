@@ -1,0 +1,174 @@
+"""The kinds of viewer path: a pose for every frame number, from keyframes, a circle or a recording.
+
+A row of `PATHS` is all a new kind needs here; its keys stand in the job's models.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.errors import ViewerError
+from quiltcli.formats.yaml.source import Source
+from quiltcli.geometry import FloatArray, normalized
+from quiltcli.job import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec
+from quiltcli.viewer.recorded import Track, read_track
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Eye (3,), metres; direction of view and up (3,), neither unit nor orthogonal yet; key to blame."""
+
+    eye: FloatArray
+    look: FloatArray
+    up: FloatArray
+    blame: tuple[str | int, ...]
+
+
+def keyframe_pose(path: PathSpec, frame: int) -> Pose:
+    """Pose between keyframes; before the first and after the last the ends are held."""
+    numbered = sorted(enumerate(path.keyframes or ()), key=lambda item: item[1].frame)
+    frames = np.array([key.frame for _, key in numbered], dtype=np.float64)
+    keys = [key for _, key in numbered]
+    # Points aimed at are interpolated as points; only directions are as directions.
+    values = np.array([[*key.position, *_aim(key), *key.up] for key in keys])
+    row = INTERPOLATIONS[path.interpolation or "linear"](frames, values, float(frame))
+    eye, aim, up = row[0:3], row[3:6], row[6:9]
+    before = max(int(np.searchsorted(frames, frame, side="right")) - 1, 0)
+    look = aim if keys[0].look is not None else aim - eye
+    return Pose(eye, look, up, ("keyframes", numbered[before][0]))
+
+
+def _aim(key: KeyframeSpec) -> FloatArray:
+    """Point looked at, or the unit direction of view."""
+    if key.look is not None:
+        return normalized(np.asarray(key.look))
+    return np.asarray(key.look_at, dtype=np.float64)
+
+
+def hold(x: FloatArray, y: FloatArray, at: float) -> FloatArray:
+    """Value (C,) of the last sample y (K, C) at or before `at`, samples standing at x (K,) ascending."""
+    last = int(np.searchsorted(x, at, side="right")) - 1
+    result: FloatArray = y[max(last, 0)]
+    return result
+
+
+def linear(x: FloatArray, y: FloatArray, at: float) -> FloatArray:
+    """Straight line (C,) between the samples y (K, C) at x (K,), the ends held."""
+    return np.array([np.interp(at, x, column) for column in y.T])
+
+
+def smooth(x: FloatArray, y: FloatArray, at: float) -> FloatArray:
+    """Cubic Hermite curve (C,) through the samples y (K, C) at x (K,), the ends held.
+
+    Tangents are those of the parabola through each sample and its two neighbours (parabolic
+    blending, A. W. Overhauser 1968; on even samples the Catmull-Rom spline). The curve is C1, and
+    exact where the samples lie on a parabola.
+    """
+    if not x[0] < at < x[-1] or x.size < 3:
+        return linear(x, y, at)
+    i = int(np.searchsorted(x, at, side="right")) - 1
+    h = x[i + 1] - x[i]
+    t = (at - x[i]) / h
+    m0, m1 = _tangent(x, y, i) * h, _tangent(x, y, i + 1) * h
+    a, b = (1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t)
+    result: FloatArray = a * y[i] + b * y[i + 1] + t * (1 - t) ** 2 * m0 - t * t * (1 - t) * m1
+    return result
+
+
+def _tangent(x: FloatArray, y: FloatArray, i: int) -> FloatArray:
+    """Slope (C,) at sample i of the parabola through it and its neighbours, or the three at the end."""
+    j = min(max(i, 1), x.size - 2)
+    h0, h1 = x[j] - x[j - 1], x[j + 1] - x[j]
+    s0, s1 = (y[j] - y[j - 1]) / h0, (y[j + 1] - y[j]) / h1
+    result: FloatArray = s0 + (s1 - s0) * (h0 + 2 * (x[i] - x[j])) / (h0 + h1)
+    return result
+
+
+INTERPOLATIONS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
+    "linear": linear,
+    "smooth": smooth,
+    "hold": hold,
+}
+
+
+def orbit_pose(path: PathSpec, frame: int) -> Pose:
+    """Pose on a circle: 0° is on the +Z side of the centre, 90° on the +X side."""
+    orbit = path.orbit
+    assert orbit is not None
+    angle = math.radians(_orbit_degrees(orbit, frame))
+    level, height = orbit.radius, orbit.height or 0.0
+    if orbit.elevation_deg is not None:
+        elevation = math.radians(orbit.elevation_deg)
+        level, height = orbit.radius * math.cos(elevation), orbit.radius * math.sin(elevation)
+    center = np.asarray(orbit.center, dtype=np.float64)
+    eye = center + np.array([level * math.sin(angle), height, level * math.cos(angle)])
+    target = center if orbit.look_at is None else np.asarray(orbit.look_at, dtype=np.float64)
+    return Pose(eye, target - eye, np.asarray(orbit.up, dtype=np.float64), ("orbit",))
+
+
+def _orbit_degrees(orbit: OrbitSpec, frame: int) -> float:
+    """Angle of a frame, degrees."""
+    passed = frame - orbit.start_frame
+    if orbit.frames_per_turn is not None:
+        # Reduced first: frame 1000001 of a hundred-frame turn is to the bit frame 1.
+        return orbit.start_deg + 360 * (math.fmod(passed, orbit.frames_per_turn) / orbit.frames_per_turn)
+    assert orbit.end_frame is not None
+    assert orbit.end_deg is not None
+    share = min(max(passed / (orbit.end_frame - orbit.start_frame), 0.0), 1.0)
+    return orbit.start_deg + (orbit.end_deg - orbit.start_deg) * share
+
+
+def csv_pose(path: PathSpec, frame: int) -> Pose:
+    """Pose of a recorded frame; a frame that was not recorded is an error, unless gaps may be filled."""
+    spec = path.csv
+    assert spec is not None
+    track = read_track(spec.file)
+    blame = path.source.at("csv")
+    row = _track_row(spec, track, frame, blame)
+    eye = row[0:3] * spec.metres
+    if track.aim == "look_at":
+        look = row[3:6] * spec.metres - eye
+    elif track.aim == "look":
+        look = row[3:6]
+    else:
+        look = _given_aim(spec, eye, blame)
+    up = row[-3:] if track.has_up else np.asarray(spec.up, dtype=np.float64)
+    return Pose(eye, look, up, ("csv",))
+
+
+def _given_aim(spec: CsvSpec, eye: FloatArray, blame: Source) -> FloatArray:
+    """Direction of view from the job, for files that hold positions only."""
+    if spec.look is not None:
+        return np.asarray(spec.look, dtype=np.float64)
+    if spec.look_at is None:
+        words = f"{spec.file} holds positions only (add look_at, a point, or look, a direction)"
+        raise ViewerError(blame.problem((), words))
+    return np.asarray(spec.look_at, dtype=np.float64) - eye
+
+
+def _track_row(spec: CsvSpec, track: Track, frame: int, blame: Source) -> FloatArray:
+    """Numbers of a frame, from its row or from between two rows."""
+    at = int(np.searchsorted(track.frames, frame))
+    if at < track.frames.size and track.frames[at] == frame:
+        row: FloatArray = track.values[at]
+        return row
+    first, last = int(track.frames[0]), int(track.frames[-1])
+    if not first < frame < last:
+        words = f"frame {frame} is not in {spec.file} (it holds frames {first} to {last})"
+        raise ViewerError(blame.problem((), words))
+    if not spec.fill:
+        before, after = int(track.frames[at - 1]), int(track.frames[at])
+        words = f"frame {frame} is missing between {before} and {after} (add it, or set fill: true)"
+        raise ViewerError(track.problem(at, words))
+    return linear(track.frames.astype(np.float64), track.values, float(frame))
+
+
+PATHS: dict[str, Callable[[PathSpec, int], Pose]] = {
+    "keyframes": keyframe_pose,
+    "orbit": orbit_pose,
+    "csv": csv_pose,
+}

@@ -1,0 +1,108 @@
+"""Where the viewer's eye is in a frame, and which way it looks.
+
+A pose is a pure function of the frame number, so any chunk of a sequence can be rendered anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.errors import Problem, QuiltError, ViewerError
+from quiltcli.geometry import FloatArray, cross, normalized
+from quiltcli.job import PathSpec, ViewerSpec
+from quiltcli.viewer.paths import PATHS, Pose
+
+
+@dataclass(frozen=True)
+class Viewer:
+    """The viewer camera of one frame.
+
+    Attributes:
+        frame: frame number.
+        eye: (3,) world position, metres.
+        look: (3,) unit view direction.
+        up: (3,) unit vector, orthogonal to `look`.
+        near: nearest depth that is drawn, metres.
+        far: farthest depth that is drawn, metres.
+        depth: `planar` measures Z along `look`; `radial` is the distance from the eye.
+    """
+
+    frame: int
+    eye: FloatArray
+    look: FloatArray
+    up: FloatArray
+    near: float
+    far: float
+    depth: str
+
+    @property
+    def camera_from_world(self) -> FloatArray:
+        """Rotation (3, 3) with the rows right, up, −look; apply it to world minus eye."""
+        return np.stack((cross(self.look, self.up), self.up, -self.look))
+
+    def depth_of(self, position: FloatArray) -> FloatArray:
+        """Depth (...) float64 of points (3, ...) given relative to the eye, metres.
+
+        Along the look direction, or the distance from the eye where depth is `radial`.
+        """
+        x, y, z = position
+        if self.depth == "radial":
+            return np.asarray(np.sqrt(x * x + y * y + z * z))
+        return np.asarray(x * self.look[0] + y * self.look[1] + z * self.look[2])
+
+
+def viewer_at(spec: ViewerSpec, frame: int, depth: str = "planar") -> Viewer:
+    """The viewer of one frame.
+
+    Args:
+        spec: the job's `viewer`.
+        frame: frame number; nothing else enters the pose.
+        depth: the job's `render.depth`.
+
+    Raises:
+        ViewerError: the path gives no usable pose at this frame.
+    """
+    pose = _pose(spec.path, frame)
+    blame = spec.path.source.at(*pose.blame)
+    distance = float(np.linalg.norm(pose.look))
+    if not distance > 1e-9:
+        why = (
+            "turns right round"
+            if spec.path.keyframes and spec.path.keyframes[0].look
+            else "is where it looks at"
+        )
+        raise ViewerError(
+            blame.problem((), f"at frame {frame} the viewer {why}: there is no direction of view")
+        )
+    look = pose.look / distance
+    right = cross(look, normalized(pose.up))
+    if not float(np.linalg.norm(right)) > 1e-6:
+        raise ViewerError(
+            blame.problem((), f"at frame {frame} the viewer looks along up (turn up elsewhere)")
+        )
+    up = normalized(cross(normalized(right), look))
+    return Viewer(frame, pose.eye, look, up, spec.near, spec.far, depth)
+
+
+def check_viewer(spec: ViewerSpec, frames: Iterable[int]) -> list[Problem]:
+    """Problems of the path over some frames, each said once."""
+    problems: list[Problem] = []
+    for frame in frames:
+        try:
+            viewer_at(spec, frame)
+        except QuiltError as error:
+            problems += error.problems
+            if len(problems) >= 20:
+                break
+    return list(dict.fromkeys(problems))
+
+
+def _pose(path: PathSpec, frame: int) -> Pose:
+    """Pose by the kind of path that was given."""
+    for kind, pose_of in PATHS.items():
+        if getattr(path, kind) is not None:
+            return pose_of(path, frame)
+    raise ViewerError(path.source.problem((), f"expected one of {', '.join(PATHS)}"))

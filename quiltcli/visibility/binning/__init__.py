@@ -1,0 +1,1 @@
+"""Which triangles may show on which facets."""

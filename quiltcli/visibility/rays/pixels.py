@@ -1,0 +1,56 @@
+"""Where quilt pixels are, and the rays through them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, OwnerArray, normalized
+from quiltcli.layout import Layout
+from quiltcli.projection.planar import QuiltRays
+
+NEIGHBOUR = 0.05
+"""Pixels from a pixel's centre to the four rays that surround it."""
+
+OFFSETS = ((0.0, 0.0), (NEIGHBOUR, 0.0), (-NEIGHBOUR, 0.0), (0.0, NEIGHBOUR), (0.0, -NEIGHBOUR))
+"""The five rays of a pixel, in pixels from its centre; the centre comes first."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """P quilt pixels.
+
+    Attributes:
+        address: (P,) flat quilt address.
+        facet: (P,) index of the facet the pixel belongs to.
+        bleed: (P,) whether it lies in that facet's bleed.
+        page: (P,) 0-based page.
+        x: (P,) column.
+        y: (P,) row.
+        ray: (P, 3, 3) page pixel (x, y, 1) → direction from the eye.
+    """
+
+    address: IntArray
+    facet: IntArray
+    bleed: BoolArray
+    page: IntArray
+    x: IntArray
+    y: IntArray
+    ray: FloatArray
+
+    def directions(self, dx: float = 0.0, dy: float = 0.0) -> FloatArray:
+        """Unit directions (P, 3) through the pixels, `dx`, `dy` pixels beside their centres."""
+        x, y = self.x + (0.5 + dx), self.y + (0.5 + dy)
+        ray = self.ray
+        return normalized(ray[:, :, 0] * x[:, None] + ray[:, :, 1] * y[:, None] + ray[:, :, 2])
+
+
+def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> Places:
+    """The pixels at flat quilt addresses (P,), each of which a facet or its bleed owns."""
+    owner = owners[address].astype(np.int64)
+    facet = np.abs(owner) - 1
+    page = layout.page[facet].astype(np.int64)
+    width = layout.pages[page, 0].astype(np.int64)
+    local = address - layout.page_offset[page]
+    return Places(address, facet, owner < 0, page, local % width, local // width, rays.eye_from_quilt[facet])

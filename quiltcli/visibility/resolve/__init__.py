@@ -1,0 +1,1 @@
+"""From a drawn canvas to what each pixel sees."""

@@ -1,0 +1,130 @@
+"""Reading pixels one by one, where several triangles show in a microtile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.visibility.resolve.hits import Hits, Places
+from quiltcli.visibility.resolve.reader import Reader, rays_through
+from quiltcli.visibility.resolve.surfaces import surfaces
+from quiltcli.visibility.resolve.tiles import Tiles
+from quiltcli.visibility.resolve.vectors import BASIS, PointVectors, vector_values
+from quiltcli.visibility.scan.keys import distinct, serial_of
+from quiltcli.visibility.setup.planes import Planes
+
+_DX, _DY = BASIS[0].astype(np.float32), BASIS[1].astype(np.float32)
+
+
+def pixel_hits(
+    reader: Reader, tiles: Tiles, keys: IntArray, pixel: IntArray, places: Places, inside: int
+) -> Hits:
+    """Hits of pixels of microtiles, each a group of its own.
+
+    Args:
+        reader: the canvas.
+        tiles: n microtiles.
+        keys: (G,) keys of the pixels.
+        pixel: (G,) the pixels, counted through all microtiles; ascending, if they are all of them.
+        places: where they lie in the quilt.
+        inside: pixels that are not bleed.
+    """
+    planes, wanted = reader.table.planes, reader.wanted
+    serial, which = distinct(serial_of(keys, reader.bits), reader.table.row_of_serial.size)
+    rows = reader.table.row_of_serial.take(serial)
+    x0, y0 = (planes.box[k].take(rows) for k in (0, 2))
+    seen = surfaces(planes, rows, wanted, reader.limits.handed, x0, y0)
+    complete = pixel.size == tiles.x.size * 64
+
+    def chosen(values: NDArray[Any]) -> NDArray[Any]:
+        """Of values (..., n, 64) those of the pixels, (..., G)."""
+        values = values.reshape(*values.shape[:-2], -1)
+        return values if complete else values.take(pixel, axis=-1)
+
+    x, y = (
+        chosen(tiles.x.astype(np.float32)[:, None] + _DX),
+        chosen(tiles.y.astype(np.float32)[:, None] + _DY),
+    )
+    inverse = _inverse(planes, rows, which, x.astype(np.float64), y.astype(np.float64))[:, None]
+    rays = rays_through(reader, tiles)
+    depth, position = rays.values()
+    normal = weights = None
+    if wanted.normals is not None:
+        normal = PointVectors(_values(seen.normal, which, x, y, x0, y0))
+    if wanted.weights:
+        second, third, total = _values(seen.weights, which, x, y, x0, y0)
+        weights = np.stack((second / total, third / total)).astype(np.float32)
+    return Hits(
+        places=places,
+        chosen=None,
+        facet=chosen(np.broadcast_to(tiles.facet[:, None], (tiles.facet.size, 64))),
+        triangle=seen.triangle.take(which),
+        ray=PointVectors(chosen(vector_values(rays.vectors))[:, :, None]),
+        depth=chosen(depth)[:, None] / inverse,
+        normal=normal,
+        weights=weights,
+        position=None if position is None else chosen(position)[:, :, None] / inverse,
+        inside=inside,
+    )
+
+
+def _inverse(planes: Planes, rows: IntArray, which: IntArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """1/t (G,), held between the least and the greatest of the triangle's corners.
+
+    Args:
+        planes: the planes of a batch.
+        rows: (S,) the pairs that are seen.
+        which: (G,) which of them each pixel sees.
+        x: (G,) columns in the block.
+        y: (G,) rows.
+    """
+    table = np.empty((rows.size, 5))
+    for k, column in enumerate((*planes.inverse, planes.low, planes.high)):
+        table[:, k] = column.take(rows)
+    table = table.take(which, axis=0)
+    result = _plane_values(table, x, y, np.empty(x.size))
+    np.maximum(result, table[:, 3], out=result)
+    np.minimum(result, table[:, 4], out=result)
+    return result
+
+
+def _values(
+    planes: NDArray[Any],
+    which: IntArray,
+    x: Float32Array,
+    y: Float32Array,
+    x0: Int32Array,
+    y0: Int32Array,
+) -> NDArray[Any]:
+    """Values (n, G, 1) of n planes (n, 3, S) of surfaces.
+
+    Args:
+        planes: the planes, from places of their own.
+        which: (G,) which surface each pixel sees.
+        x: (G,) columns in the block.
+        y: (G,) rows.
+        x0: (S,) columns at which the planes begin.
+        y0: (S,) rows.
+    """
+    # One look-up of a row takes as long as one of a single number.
+    count = 3 * len(planes)
+    table = np.empty((x0.size, count + 2), dtype=planes.dtype)
+    table[:, :count] = planes.reshape(count, -1).T
+    table[:, count], table[:, count + 1] = x0, y0
+    table = table.take(which, axis=0)
+    x, y = x - table[:, count], y - table[:, count + 1]
+    result = np.empty((len(planes), which.size, 1), dtype=planes.dtype)
+    for k in range(len(planes)):
+        _plane_values(table[:, 3 * k :], x, y, result[k, :, 0])
+    return result
+
+
+def _plane_values(rows: NDArray[Any], x: NDArray[Any], y: NDArray[Any], result: NDArray[Any]) -> NDArray[Any]:
+    """Put into `result` (G,) the values of planes given in rows (G, 3 or more)."""
+    np.multiply(rows[:, 0], x, out=result)
+    result += rows[:, 1] * y
+    result += rows[:, 2]
+    return result

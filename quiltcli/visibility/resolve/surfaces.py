@@ -1,0 +1,112 @@
+"""The surfaces that are seen: what is linear over the pixels of each visible triangle.
+
+An attribute a of a triangle is Σ aₖEₖ / ΣEₖ, so its numerator is a plane like the edge functions
+are. A normal needs no more: its length does not matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.visibility.resolve.hits import Wanted
+from quiltcli.visibility.resolve.vectors import PointVectors
+from quiltcli.visibility.setup.planes import Planes, moved, power_of_two
+
+_NEAR = 8.0  # pixels, about as far as a surface's pixels are from where its planes begin
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Planes (a, b, c) over the pixels about a place of their own, of n visible pairs.
+
+    Attributes:
+        triangle: (n,) triangle index.
+        normal: (3, 3, n) planes of the normal [axis, coefficient] on the side of the eye, of any length;
+            none unless wanted, (0, 3, n).
+        weights: (3, 3, n) planes of the second and third edge function and of the sum of all; none
+            unless wanted, (0, 3, n).
+    """
+
+    triangle: Int32Array
+    normal: Float32Array
+    weights: FloatArray
+
+
+def surfaces(
+    planes: Planes, rows: IntArray, wanted: Wanted, handed: FloatArray, x: NDArray[Any], y: NDArray[Any]
+) -> Surfaces:
+    """The surfaces of some pairs.
+
+    Args:
+        planes: the planes of a batch.
+        rows: (n,) the pairs.
+        wanted: what is asked for.
+        handed: (K,) sign of the determinant of every block's matrix.
+        x: (n,) columns in the blocks at which the planes begin.
+        y: (n,) rows.
+    """
+    triangle = planes.triangle.take(rows)
+    normal = np.zeros((0, 3, rows.size), dtype=np.float32)
+    weights = np.zeros((0, 3, rows.size))
+    if wanted.normals is not None or wanted.weights:
+        edge = moved(np.take(planes.edge, rows, axis=2), x, y)
+        edge[0] += edge[1]
+        edge[0] += edge[2]
+        edge *= facing(planes, rows, handed)
+        if wanted.normals is not None:
+            normal = _normals(wanted.normals.take(triangle, axis=0), edge)
+        if wanted.weights:
+            weights = edge[[1, 2, 0]]
+    return Surfaces(
+        triangle=triangle,
+        normal=normal,
+        weights=weights,
+    )
+
+
+def facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
+    """1 for pairs (n,) whose triangle's front the eye sees, −1 for those it sees from behind."""
+    result: FloatArray = planes.turn.take(rows) * -handed.take(planes.block.take(rows))
+    return result
+
+
+def has_one_normal(table: Float32Array, triangle: Int32Array) -> BoolArray:
+    """Which triangles (n,) have the same normal at all corners, by the scene's `corner_normals`."""
+    return np.asarray(~table.take(triangle, axis=0)[:, 3:9].any(axis=1))
+
+
+def one_normal(table: Float32Array, planes: Planes, rows: IntArray, handed: FloatArray) -> PointVectors:
+    """The normals, on the side of the eye, of pairs (n,) whose triangles have one each.
+
+    Returns:
+        (3, n, 1), or (3, 1, 1) where all are the same.
+    """
+    triangle, side = planes.triangle.take(rows), facing(planes, rows, handed)
+    if bool((triangle == triangle[0]).all() and (side == side[0]).all()):
+        triangle, side = triangle[:1], side[:1]
+    normal = table.take(triangle, axis=0).T[0:3] * side
+    return PointVectors(normal.astype(np.float32)[:, :, None])
+
+
+def _normals(corners: Float32Array, edge: FloatArray) -> Float32Array:
+    """Planes (3, 3, n) of normals.
+
+    Args:
+        corners: (n, 12) rows of the scene's `corner_normals`.
+        edge: (3, 3, n) planes of the sum of the edge functions, of the second and of the third.
+    """
+    reach = np.abs(edge[0])
+    reach[:2] *= _NEAR
+    edge = edge / power_of_two(np.maximum(reach.max(axis=0), 1e-300))
+    total, second, third = edge.astype(np.float32)
+    corner = np.ascontiguousarray(corners.T[:9]).reshape(3, 3, 1, -1)
+    normal: Float32Array = corner[0] * total
+    part = corner[1] * second
+    normal += part
+    normal += np.multiply(corner[2], third, out=part)
+    return normal

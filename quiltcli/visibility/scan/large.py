@@ -1,0 +1,395 @@
+"""Large triangles: tiles are rejected, hidden or filled as a whole before any pixel is looked at.
+
+A triangle's box is cut into tiles of 64 pixels, those into microtiles of 8. The values of the edge
+functions at a tile's corners tell whether it lies outside, inside, or on an edge; a tile that a
+surface covers completely hides everything farther away in it. A microtile that one triangle fills
+with nothing else left in it is noted down by that triangle alone. What remains is evaluated 64
+pixels at a time, one pair a microtile and round, so that no two writes of a round meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments, slices
+from quiltcli.visibility.resolve.surfaces import facing
+from quiltcli.visibility.resolve.vectors import BASIS, grid_values
+from quiltcli.visibility.scan.depth import DepthRange
+from quiltcli.visibility.scan.keys import depth_part, make_keys, serial_of, serial_part
+from quiltcli.visibility.scan.order import BatchOrder
+from quiltcli.visibility.setup.blocks import SIDE, Canvas, least_keys
+from quiltcli.visibility.setup.planes import Planes, moved
+
+MICROTILE = 8
+TILE = 64
+_ACROSS = TILE // MICROTILE
+_SIZES = (1, 2, 4, 8)
+_CLASS_OF = np.searchsorted(np.asarray(_SIZES), np.arange(_ACROSS + 1))
+_CELLS = 1 << 16
+_ROUND = 1024
+_EARLY = 3
+_CLEARLY = 2.0**-24  # as a share of 1/t: more than keys and the rounding of planes can tell
+_X, _Y = (BASIS[k] for k in (0, 1))
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Parts of pairs that span at most 8 × 8 microtiles.
+
+    Attributes:
+        row: (R,) the pair, a row of `Planes`.
+        box: (4, R) first and last microtile column, first and last row in the block.
+    """
+
+    row: IntArray
+    box: IntArray
+
+
+@dataclass(frozen=True)
+class Spans:
+    """S (pair, microtile) combinations that may hold fragments.
+
+    Attributes:
+        row: (S,) the pair, a row of `Planes`.
+        tile: (S,) the microtile's index in the canvas.
+        x: (S,) first pixel column of the microtile in its block.
+        y: (S,) first pixel row.
+        crossed: (S,) bit k set where edge k crosses the microtile; 0 means fully covered.
+        least: (S,) least 1/t in it.
+        greatest: (S,) greatest 1/t in it.
+    """
+
+    row: IntArray
+    tile: IntArray
+    x: IntArray
+    y: IntArray
+    crossed: NDArray[np.uint8]
+    least: FloatArray
+    greatest: FloatArray
+
+    def __getitem__(self, part: slice) -> Spans:
+        """A range of the combinations, as views."""
+        return Spans(*(column[part] for column in vars(self).values()))
+
+    def take(self, keep: IntArray) -> Spans:
+        """The combinations with these indices."""
+        return Spans(*(column.take(keep) for column in vars(self).values()))
+
+
+def large_spans(planes: Planes, canvas: Canvas, by: BatchOrder | None = None) -> Spans:
+    """The microtiles that pairs of any size may show in.
+
+    Args:
+        planes: the pairs.
+        canvas: the microtiles.
+        by: what to order by instead of 1/t; tiles of pairs that lie behind others are not left out then.
+    """
+    return _spans(planes, _pieces(planes, by is None), canvas)
+
+
+def covering_keys(planes: Planes, spans: Spans, canvas: Canvas, bits: int) -> IntArray:
+    """Keys (M,) that every pixel of a microtile will have at least, for a pair covers it; 0 for none."""
+    nearest = np.zeros(canvas.touched.size, dtype=np.int64)
+    covers = np.flatnonzero((spans.crossed == 0) & ~planes.cut.take(spans.row))
+    serial = serial_part(planes.serial.take(spans.row[covers]), bits)
+    np.maximum.at(nearest, spans.tile[covers], make_keys(spans.least[covers], serial, bits))
+    return nearest
+
+
+def draw_large(
+    planes: Planes,
+    spans: Spans,
+    covering: IntArray | None,
+    canvas: Canvas,
+    limits: DepthRange,
+    bits: int,
+    by: BatchOrder | None = None,
+) -> int:
+    """Draw pairs of any size.
+
+    Args:
+        planes: the pairs.
+        spans: from `large_spans`.
+        covering: from `covering_keys`; None with `by`.
+        canvas: what smaller pairs have left; its keys are raised, and microtiles that one pair fills noted.
+        limits: near and far, for pairs that reach beyond them.
+        bits: bits of the serial in a key.
+        by: what to order by instead of 1/t.
+
+    Returns:
+        Number of pixels that were evaluated.
+    """
+    drawn = 0
+    if covering is not None:
+        least = least_keys(canvas)
+        np.greater(least, 0, out=canvas.full)
+        spans = _not_behind(spans, np.maximum(least, covering), bits)
+        spans = spans.take(np.flatnonzero(~_behind_cover(planes, spans, covering, bits)))
+        spans = _fill(planes, spans, canvas)
+        # Backs and walls come last: pieces of other surfaces may hide them together.
+        last = (spans.crossed == 0) | (facing(planes, spans.row, limits.handed) < 0)
+        first, spans = spans.take(np.flatnonzero(~last)), spans.take(np.flatnonzero(last))
+        _draw_rounds(planes, first, canvas, limits, bits, by)
+        drawn = first.row.size
+        left = np.zeros(canvas.touched.size, dtype=np.bool_)
+        left[spans.tile] = True
+        spans = _not_behind(spans, least_keys(canvas, left), bits)
+    _draw_rounds(planes, spans, canvas, limits, bits, by)
+    return (drawn + spans.row.size) * MICROTILE * MICROTILE
+
+
+def _pieces(planes: Planes, hide: bool) -> Pieces:
+    """The pairs, those that are wider or higher than 8 microtiles cut at the borders of tiles.
+
+    Tiles that a wide pair does not touch are left out, and with `hide` those that lie behind others.
+    """
+    x0, x1, y0, y1 = box = (planes.box >> 3).astype(np.int64)
+    wide = np.maximum(x1 - x0, y1 - y0) >= _ACROSS
+    near = np.flatnonzero(~wide)
+    if near.size == wide.size:
+        return Pieces(near, box)
+    row, x, y = _tiles(np.flatnonzero(wide), planes.box[:, wide])
+    least, greatest = _extremes(np.take(planes.edge, row, axis=2), x, y)
+    covered = np.all(least > 0, axis=0)
+    keep = np.all(greatest > 0, axis=0)
+    if hide:
+        keep &= ~_behind(planes, row, x, y, covered)
+    row, x, y = row[keep], x[keep] >> 3, y[keep] >> 3
+    ends = np.stack((x, x + _ACROSS - 1, y, y + _ACROSS - 1))
+    cut = box[:, row]
+    cut[0::2] = np.maximum(cut[0::2], ends[0::2])
+    cut[1::2] = np.minimum(cut[1::2], ends[1::2])
+    return Pieces(np.concatenate((near, row)), np.concatenate((box[:, near], cut), axis=1))
+
+
+def _tiles(rows: IntArray, box: Int32Array) -> tuple[IntArray, IntArray, IntArray]:
+    """Row, first column and first row (S,) of all tiles that the pixel boxes (4, R) of rows (R,) touch."""
+    x0, x1, y0, y1 = (box // TILE).astype(np.int64)
+    across = x1 - x0 + 1
+    owner, rank = segments(np.concatenate(([0], np.cumsum(across * (y1 - y0 + 1)))))
+    y, x = np.divmod(rank, across[owner])
+    return rows[owner], (x0[owner] + x) * TILE, (y0[owner] + y) * TILE
+
+
+def _extremes(plane: FloatArray, x: IntArray, y: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest values (..., S) of planes (..., 3, S) at the pixels of tiles at x, y (S,)."""
+    a, b, c = plane[..., 0, :], plane[..., 1, :], plane[..., 2, :]
+    first = a * x + b * y + c
+    reach_x, reach_y = a * (TILE - 1), b * (TILE - 1)
+    least = first + np.minimum(reach_x, 0) + np.minimum(reach_y, 0)
+    greatest = first + np.maximum(reach_x, 0) + np.maximum(reach_y, 0)
+    return least, greatest
+
+
+def _behind(planes: Planes, row: IntArray, x: IntArray, y: IntArray, covered: BoolArray) -> BoolArray:
+    """Which pairs lie, in a tile at x, y (S,), wholly behind one that covers it."""
+    least, greatest = _extremes(np.take(planes.inverse, row, axis=1), x, y)
+    low, high = planes.low.take(row), planes.high.take(row)
+    least, greatest = _held(least, low, high), _held(greatest, low, high)
+    per_block = (SIDE // TILE) ** 2
+    place = planes.block.take(row) * np.int64(per_block) + y // TILE * (SIDE // TILE) + x // TILE
+    nearest = np.zeros(int(place.max(initial=-1)) + 1)
+    covers = np.flatnonzero(covered & ~planes.cut.take(row))
+    np.maximum.at(nearest, place[covers], least[covers])
+    result: BoolArray = greatest < nearest[place]
+    return result
+
+
+def _held(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Values of 1/t (S,) held between those of the corners, as they are where they are drawn."""
+    return np.minimum(np.maximum(values, low, out=values), high, out=values)
+
+
+def _spans(planes: Planes, pieces: Pieces, canvas: Canvas) -> Spans:
+    """The microtiles of all pieces that lie on the inner side of some pixel of every edge."""
+    wide = _CLASS_OF[pieces.box[1] - pieces.box[0] + 1]
+    high = _CLASS_OF[pieces.box[3] - pieces.box[2] + 1]
+    classes = (high * len(_SIZES) + wide).astype(np.uint16)
+    order = np.argsort(classes, kind="stable")
+    classes = classes[order]
+    bounds = np.flatnonzero(np.diff(classes, prepend=np.uint16(65535), append=np.uint16(65535)))
+    found = []
+    for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        shape = _SIZES[classes[first] // len(_SIZES)], _SIZES[classes[first] % len(_SIZES)]
+        step = _CELLS // (shape[0] * shape[1])
+        for cells in slices(first, last, step):
+            part = order[cells]
+            found.append(_class_spans(planes, pieces.row[part], pieces.box[:, part], shape, canvas))
+    columns = zip(*(vars(spans).values() for spans in found), strict=True)
+    return Spans(*(np.concatenate(column) for column in columns)) if found else _no_spans()
+
+
+def _no_spans() -> Spans:
+    """None at all."""
+    whole, real = np.zeros(0, dtype=np.int64), np.zeros(0)
+    return Spans(whole, whole, whole, whole, np.zeros(0, dtype=np.uint8), real, real)
+
+
+def _class_spans(
+    planes: Planes, row: IntArray, box: IntArray, shape: tuple[int, int], canvas: Canvas
+) -> Spans:
+    """Spans of n pieces that are looked at in this many (rows, columns) of microtiles."""
+    rows, columns = shape
+    x0, x1, y0, y1 = box
+    i, j = np.arange(columns)[:, None], np.arange(rows)[:, None]
+    inside = (j <= y1 - y0)[:, None] & (i <= x1 - x0)
+    crossed = np.zeros((rows, columns, row.size), dtype=np.uint8)
+    for k in range(3):
+        values, down, up = _corner_values(np.take(planes.edge[k], row, axis=1), x0, y0, i, j)
+        inside &= values > -up
+        crossed |= (values <= -down).view(np.uint8) << np.uint8(k)
+    block = planes.block.take(row)
+    keep = np.flatnonzero(inside)
+    cell, piece = np.divmod(keep, row.size)
+    x = x0.take(piece) + cell % columns
+    y = y0.take(piece) + cell // columns
+    place = block.take(piece)
+    tile = canvas.tile_start.take(place) + y * canvas.tiles_across.take(place) + x
+    used = np.flatnonzero(canvas.used.take(tile))
+    if used.size < tile.size:
+        keep, piece, x, y, tile = (values.take(used) for values in (keep, piece, x, y, tile))
+    values, down, up = _corner_values(np.take(planes.inverse, row, axis=1), x0, y0, i, j)
+    row = row.take(piece)
+    values = values.ravel().take(keep)
+    low, high = planes.low.take(row), planes.high.take(row)
+    return Spans(
+        row=row,
+        tile=tile,
+        x=x * MICROTILE,
+        y=y * MICROTILE,
+        crossed=crossed.ravel().take(keep),
+        least=_held(values + down.take(piece), low, high),
+        greatest=_held(values + up.take(piece), low, high),
+    )
+
+
+def _corner_values(
+    plane: FloatArray, x: IntArray, y: IntArray, i: IntArray, j: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Values of planes (3, n) at the first pixels of microtiles, and how far others go down and up.
+
+    Args:
+        plane: the planes.
+        x: (n,) microtile columns to begin at.
+        y: (n,) microtile rows to begin at.
+        i: (columns, 1) further columns.
+        j: (rows, 1) further rows.
+
+    Returns:
+        values (rows, columns, n); the most that a pixel of a microtile has less (n,), and more (n,).
+    """
+    a, b, c = plane
+    across, below = a * MICROTILE, b * MICROTILE
+    lines = below * (y + j)
+    lines += c
+    values = lines[:, None] + across * (x + i)
+    reach_x, reach_y = a * (MICROTILE - 1), b * (MICROTILE - 1)
+    down = np.minimum(reach_x, 0) + np.minimum(reach_y, 0)
+    up = np.maximum(reach_x, 0) + np.maximum(reach_y, 0)
+    return values, down, up
+
+
+def _not_behind(spans: Spans, least: IntArray, bits: int) -> Spans:
+    """The spans that are not wholly behind the `least` keys (M,) that the pixels of their microtiles have."""
+    return spans.take(np.flatnonzero(spans.greatest >= depth_part(least, bits).take(spans.tile)))
+
+
+def _behind_cover(planes: Planes, spans: Spans, covering: IntArray, bits: int) -> BoolArray:
+    """Which spans (S,) lie, pixel by pixel, behind the pair that covers their microtile.
+
+    So does the far side of a thin wall, though somewhere in the microtile it is nearer than the near
+    side is elsewhere.
+    """
+    result = np.zeros(spans.row.size, dtype=np.bool_)
+    key = covering.take(spans.tile)
+    some = np.flatnonzero(key)
+    row_of_serial = np.empty(int(planes.serial.max(initial=0)) + 1, dtype=np.int64)
+    row_of_serial[planes.serial] = np.arange(planes.serial.size)
+    cover, row = row_of_serial.take(serial_of(key.take(some), bits)), spans.row.take(some)
+    behind = np.take(planes.inverse, row, axis=1)
+    behind -= (1 - _CLEARLY) * np.take(planes.inverse, cover, axis=1)
+    a, b, c = moved(behind, spans.x.take(some), spans.y.take(some))
+    c += np.maximum(a * (MICROTILE - 1), 0) + np.maximum(b * (MICROTILE - 1), 0)
+    # What is drawn of a sliver is held to its corners.
+    held = planes.low.take(row) < (1 - _CLEARLY) * depth_part(key.take(some), bits)
+    result[some] = (c < 0) & held & (cover != row)
+    return result
+
+
+def _fill(planes: Planes, spans: Spans, canvas: Canvas) -> Spans:
+    """Note the microtiles that have nothing but one pair that fills them; the spans of all others."""
+    count = np.bincount(spans.tile, minlength=canvas.touched.size)
+    count += canvas.touched
+    alone = (count.take(spans.tile) == 1) & (spans.crossed == 0) & ~planes.cut.take(spans.row)
+    filled = np.flatnonzero(alone)
+    canvas.filler[spans.tile[filled]] = planes.serial.take(spans.row[filled]) + np.int64(1)
+    return spans.take(np.flatnonzero(~alone))
+
+
+def _draw_rounds(
+    planes: Planes, spans: Spans, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None
+) -> None:
+    """Evaluate the microtiles' pixels, in rounds in which every microtile occurs once."""
+    canvas.touched[spans.tile] = True
+    group, order = _rounds(spans)
+    spans = spans.take(order)
+    bounds = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
+    for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        for part in slices(first, last, _ROUND):
+            few = spans[part]
+            keys = canvas.keys.take(few.tile, axis=0)
+            canvas.keys[few.tile] = np.maximum(keys, _tile_keys(planes, few, limits, bits, by), out=keys)
+
+
+def _rounds(spans: Spans) -> tuple[IntArray, IntArray]:
+    """Numbers of groups (S,) to be evaluated together, ascending, and the spans in their order (S,).
+
+    In a group no microtile comes twice, and, but for the late rounds, the same edges cross all: few
+    spans are left then, and one evaluation for all costs less than several.
+    """
+    by_tile = _sorted_order(spans.tile)
+    tile = spans.tile[by_tile]
+    fresh = np.flatnonzero(np.diff(tile, prepend=-1))
+    rank = np.arange(tile.size) - np.repeat(fresh, np.diff(fresh, append=tile.size))
+    crossed = spans.crossed[by_tile].astype(np.int64)
+    group = rank * 8 + np.where(rank < _EARLY, crossed, np.minimum(crossed, 1))
+    by_group = _sorted_order(group)
+    return group[by_group], by_tile[by_group]
+
+
+def _sorted_order(values: IntArray) -> IntArray:
+    """The order (S,) that sorts small whole numbers; equal ones stay as they are."""
+    packed = values << 32 | np.arange(values.size)
+    packed.sort()
+    packed &= 0xFFFFFFFF
+    return packed
+
+
+def _tile_keys(
+    planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None
+) -> IntArray:
+    """Keys (S, 64) of some microtiles; negative where they are not covered."""
+    row, x, y = spans.row, spans.x, spans.y
+    crossed = int(np.bitwise_or.reduce(spans.crossed))
+
+    def values(plane: FloatArray) -> FloatArray:
+        return grid_values(moved(np.take(plane, row, axis=1), x, y))
+
+    inverse = values(planes.inverse)
+    np.maximum(inverse, planes.low.take(row)[:, None], out=inverse)
+    np.minimum(inverse, planes.high.take(row)[:, None], out=inverse)
+    edges = [values(planes.edge[k]) for k in range(3) if crossed >> k & 1]
+    for other in edges[1:]:
+        np.minimum(edges[0], other, out=edges[0])
+    cut = planes.cut.take(row)
+    if cut.any():
+        kept = limits.keeps(planes.block.take(row)[:, None], x[:, None] + _X, y[:, None] + _Y, inverse)
+        np.negative(inverse, out=inverse, where=~kept & cut[:, None])
+    if edges:
+        np.copysign(inverse, np.minimum(inverse, edges[0], out=edges[0]), out=inverse)
+    if by is not None:
+        inverse = by.values(planes.block.take(row)[:, None], x[:, None] + _X, y[:, None] + _Y, inverse)
+    return make_keys(inverse, serial_part(planes.serial.take(row), bits)[:, None], bits)

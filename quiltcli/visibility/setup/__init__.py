@@ -1,0 +1,1 @@
+"""What is made ready once a frame: blocks, triangles in them, planes."""

@@ -1,0 +1,59 @@
+"""The scenes that come with the program: made by their generator, loadable, and of the right size."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quiltcli.scene import load_scene
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+def test_the_generator_wrote_the_meshes(tmp_path):
+    program = (
+        f"import sys; sys.path.insert(0, {str(SCENES)!r}); import generate, pathlib;"
+        f"generate.write(pathlib.Path({str(tmp_path)!r}), generate.MESHES)"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+    made = sorted(path.name for path in tmp_path.iterdir())
+    assert made == sorted(p.name for p in SCENES.iterdir() if p.suffix in (".obj", ".mtl"))
+    for name in made:
+        assert (tmp_path / name).read_bytes() == (SCENES / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("teapot_and_solids", (-0.26, 0, -0.26), (0.26, 0.29, 0.26)),
+        ("teapot_in_sphere", (-0.3, 0, -0.3), (0.3, 0.6, 0.3)),
+        ("plates_and_sphere", (-0.26, 0, -0.26), (0.26, 0.3, 0.26)),
+        ("room", (-3, 0, -3), (3, 3.2, 3)),
+    ],
+)
+def test_scenes_load_quietly_and_fit(name, low, high):
+    scene = load_scene(SCENES / f"{name}.yaml")
+    assert scene.notices == ()
+    assert (scene.vertices >= np.array(low) - 1e-9).all()
+    assert (scene.vertices <= np.array(high) + 1e-9).all()
+    assert len(scene.triangles) < 20_000
+
+
+def test_the_sphere_scene_stays_inside_its_sphere():
+    vertices = load_scene(SCENES / "teapot_in_sphere.yaml").vertices
+    assert np.linalg.norm(vertices - (0, 0.3, 0), axis=1).max() < 0.285
+
+
+def test_everything_stands_on_the_board():
+    scene = load_scene(SCENES / "teapot_and_solids.yaml")
+    for index, name in enumerate(scene.objects):
+        lowest = scene.vertices[scene.triangles[scene.object == index]][..., 1].min()
+        assert lowest > 0.0155 or name == "board"
+
+
+def test_scenes_are_small():
+    assert sum(path.stat().st_size for path in SCENES.glob("*.*")) < 3_000_000
