@@ -31,7 +31,7 @@ from quiltcli.layout import align, read_layout
 from quiltcli.layout.packing import layout_for
 from quiltcli.scene import load_scene
 from quiltcli.viewer.edge_on import eye_problems
-from quiltcli.viewer.viewer import check_viewer, viewer_at
+from quiltcli.viewer.view import view_problems, viewers_of
 
 T = TypeVar("T")
 
@@ -124,7 +124,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if job is None:
         findings.named_in(path)
         return
-    found = check_viewer(job.viewer, job.frames)
+    found = view_problems(job, job.frames)
     findings.problems += found
     facets = findings.facets(job.display)
     choice = job.layout or (load_display_file(job.display).layout if facets else None) or PackSpec()
@@ -133,7 +133,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.run(read_layout, choice)
     findings.run(load_scene, findings.run(load_scene_file, job.scene))
     if facets is not None and not found:
-        viewers = [viewer_at(job.viewer, frame, job.render.depth) for frame in job.frames]
+        viewers = viewers_of(job, job.frames)
         findings.problems += eye_problems(facets, viewers, job.viewer.source)
 
 

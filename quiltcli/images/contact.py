@@ -14,7 +14,7 @@ import numpy as np
 
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.drawing.font import HEIGHT, text_mask, text_width
-from quiltcli.formats.exr.image import facet_path, numbers_in_name, quilt_path
+from quiltcli.images.names import facet_path, name_of, quilt_path
 from quiltcli.images.preview import Bytes, Look, display_values, image_colors, scaled_down, write_values
 from quiltcli.job.frames import format_frames
 
@@ -89,9 +89,8 @@ def chosen_images(out: Path, sheet: Sheet) -> list[tuple[str, Path]]:
 def _images(out: Path) -> Iterator[tuple[str, int, int]]:
     """Kind, frame and number of every image of a folder."""
     for path in (*out.glob("quilt/page_*.exr"), *out.glob("facets/facet_*.exr")):
-        if found := numbers_in_name(path):
-            kind, number, frame = found
-            yield kind, frame, number
+        if found := name_of(path):
+            yield found.kind, found.frame, found.number
 
 
 def _thumbnail(path: Path, sheet: Sheet) -> Bytes:

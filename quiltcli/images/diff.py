@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem
-from quiltcli.formats.exr.image import Image, frame_digits, read_parts
+from quiltcli.formats.exr.image import Image, read_parts
 from quiltcli.geometry import BoolArray
+from quiltcli.images.names import frame_digits
 from quiltcli.images.window import whole_frame
 
 MATCH, WARN, FAIL, SIZE, FILE = 0, 1, 2, 3, 4

@@ -9,22 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.channels import BACKGROUND
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.layout import Layout
-from quiltcli.shading.aovs import CHANNELS, exr_channels
 
 Channel: TypeAlias = NDArray[Any]
-
-BACKGROUND: Mapping[str, float] = MappingProxyType(
-    {layer: empty for layer, (_, empty) in exr_channels(CHANNELS).items()}
-)
-"""What pixels of no facet hold, by EXR channel; 0 in channels that are not named."""
 
 _WHOLE = 1e-3  # pixels a raster's corners may be off a whole-pixel map: centres stay in the same pixels
 

@@ -9,19 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from quiltcli.channels import BACKGROUND
 from quiltcli.errors import OutputError, Problem, raise_all
-from quiltcli.formats.exr.image import (
-    Image,
-    facet_attributes,
-    facet_path,
-    numbers_in_name,
-    read_exr,
-    read_header,
-    write_exr,
-)
+from quiltcli.formats.exr.image import Image, read_exr, read_header, write_exr
 from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import facet_from_world
-from quiltcli.images.facets import BACKGROUND, cut_facet, page_of
+from quiltcli.images.facets import cut_facet, page_of
+from quiltcli.images.metadata import facet_attributes
+from quiltcli.images.names import facet_path, name_of
 from quiltcli.images.window import frame_size, whole_frame
 from quiltcli.layout import Layout, pixel_owners
 
@@ -118,9 +113,9 @@ def _identified(path: Path, layout: Layout) -> QuiltFile:
 
 
 def _page_number(path: Path, header: Image, layout: Layout) -> int:
-    named = numbers_in_name(path)
-    if named and named[0] == "page":
-        return named[1]
+    named = name_of(path)
+    if named and named.kind == "page":
+        return named.number
     known = header.attributes.get("quilt:page", 1 if len(layout.pages) == 1 else None)
     if not isinstance(known, int):
         wanted = "expected a name like page_01.0001.exr or the attribute quilt:page"

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.channels import BACKGROUND
 from quiltcli.formats.exr.image import Channel, Image, Window
-from quiltcli.images.facets import BACKGROUND
 
 _STRIP = 64  # rows or columns looked at together
 

@@ -7,7 +7,7 @@ Load a file and every problem in it comes in one `JobError`; every model and par
 from quiltcli.job.digest import file_sha256, job_sha256
 from quiltcli.job.display import UNITS, DisplayFile, FacetSpec, ResolutionSpec, TransformSpec
 from quiltcli.job.dump import dump_job, dump_yaml
-from quiltcli.job.job import CHANNELS, COMPRESSIONS, JobFile, OutputSpec, RenderSpec
+from quiltcli.job.job import COMPRESSIONS, JobFile, OutputSpec, RenderSpec
 from quiltcli.job.layout import PACKING_METHODS, LayoutFile, PackSpec, PageSpec, PlaceSpec, UvLayoutSpec
 from quiltcli.job.load import (
     check_file,
@@ -29,7 +29,6 @@ from quiltcli.job.scene import (
 from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, ViewerSpec
 
 __all__ = [
-    "CHANNELS",
     "COMPRESSIONS",
     "PACKING_METHODS",
     "UNITS",

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
 
+from quiltcli.channels import CHANNELS
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
 from quiltcli.job.model import (
     YAMLS,
@@ -31,7 +32,6 @@ from quiltcli.job.viewer import FrameRange, ViewerSpec
 
 METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
 DEPTH_BITS = ("16", "24", "32f")
-CHANNELS = ("rgba", "Z", "zv", "facet", "object", "triangle", "N", "P")
 COMPRESSIONS = (
     *("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256"),  # lossless
     *("pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k"),  # lossy
@@ -125,7 +125,7 @@ class OutputSpec(Model):
     """Write quilt pages."""
     facets: bool = True
     """Write one image a facet."""
-    channels: Annotated[tuple[Annotated[str, OneOf(CHANNELS)], ...], Listed, Field(min_length=1)] = (
+    channels: Annotated[tuple[Annotated[str, OneOf(tuple(CHANNELS))], ...], Listed, Field(min_length=1)] = (
         "rgba",
         "Z",
     )

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from quiltcli.channels import MOST_HALF
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
 from quiltcli.shading.adaptive import NodeShader, pixel_colors
 from quiltcli.shading.aovs import fill, wanted_for
-from quiltcli.shading.shade import MOST_HALF, shading_wants
+from quiltcli.shading.shade import shading_wants
 from quiltcli.visibility.draw import Drawing, Frame, Hits, draw, rasterize
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.channels import empty_buffers, exr_channels
 from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.render.setup import Stage
-from quiltcli.shading.aovs import empty_buffers, exr_channels
-from quiltcli.visibility.draw import block_window
+from quiltcli.visibility.draw import Frame, block_window
 
 Buffers = dict[str, NDArray[Any]]
 
@@ -64,3 +65,52 @@ def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
         for name, value in zip("RGB", stage.scene.background, strict=True):
             pixels = block_window(buffers[name], stage.blocks, block)
             np.copyto(pixels, value, where=mine, casting="same_kind")
+
+
+def empty_before(
+    stage: Stage,
+    frame: Frame,
+    buffers: Buffers,
+    only: BoolArray | None,
+    dirty: BoolArray | None,
+    clear_some: Callable[[IntArray, Buffers], None],
+) -> BoolArray:
+    """Empty what the frame before has left, but for what drawing empties itself.
+
+    Args:
+        stage: what the job's frames share.
+        frame: the frame that is about to be drawn.
+        buffers: emptied.
+        only: (F,) the only facets whose pixels are touched, None for all.
+        dirty: (M,) microtiles that may hold something, None where it is not known.
+        clear_some: empties blocks, as `clear_blocks`.
+
+    Returns:
+        (M,) microtiles that still hold something, which drawing has to empty where nothing is seen.
+    """
+    stale = np.zeros(stage.blocks.used.size, dtype=np.bool_)
+    if only is not None or dirty is None:
+        clear(stage, buffers, only)
+        return stale
+    mended = (frame.pairs.per_block > 0) & mends_itself(stage)
+    clear_some(np.flatnonzero(stage.blocks.any_tile(dirty) & ~mended), buffers)
+    return np.asarray(dirty & mended.repeat(np.diff(stage.blocks.tile_start)))
+
+
+def written_blocks(stage: Stage, frame: Frame) -> BoolArray:
+    """Blocks (B,) into whose pixels a frame writes: those with triangles, and where a background shows."""
+    written: BoolArray = frame.pairs.per_block > 0
+    return written | frame.rays.lit[stage.blocks.facet] if has_background(stage) else written
+
+
+def note_drawn(
+    stage: Stage,
+    drawn: Iterable[tuple[tuple[int, int], BoolArray]],
+    only: BoolArray | None,
+    dirty: BoolArray,
+) -> None:
+    """Note in `dirty` (M,) which microtiles hold something now, from batches and theirs that do."""
+    if only is None:
+        dirty[:] = False
+    for batch, tiles in drawn:
+        dirty[stage.blocks.tiles(batch)] |= tiles

@@ -19,9 +19,10 @@ from typing import Any
 from quiltcli import __version__
 from quiltcli.errors import CheckFailedError, JobError, MissingExtraError, Problem, QuiltError, raise_all
 from quiltcli.job import JobFile, job_sha256, load_job
-from quiltcli.render.frame import default_threads
+from quiltcli.render.crew import default_threads
 from quiltcli.render.interrupt import Stopped, stop_between_frames
-from quiltcli.render.outputs import frame_is_complete, outputs, write_settings
+from quiltcli.render.notices import stage_warnings
+from quiltcli.render.outputs import outputs, view_is_complete, write_settings
 from quiltcli.render.report import FrameRecord, write_report
 from quiltcli.render.sequence import (
     Listener,
@@ -30,10 +31,9 @@ from quiltcli.render.sequence import (
     chosen_facets,
     prepare,
     render_frames,
-    stage_warnings,
-    viewer_path,
 )
 from quiltcli.render.setup import Stage, set_stage
+from quiltcli.viewer.view import View
 
 _RETRIES = 2
 _SECONDS_TO_CONNECT = 10
@@ -42,18 +42,18 @@ _loading = threading.Lock()
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker must know of a frame.
+    """What a worker must know of a view.
 
     Attributes:
         job_file: the resolved job in the output folder.
         job_sha: its hash; a worker that finds another draws nothing.
-        frame: the frame.
+        view: what is drawn.
         options: the command line's, with an absolute folder.
     """
 
     job_file: Path
     job_sha: str
-    frame: int
+    view: View
     options: RenderOptions
 
 
@@ -84,13 +84,13 @@ def render_on(
     ready = prepare(job, options)
     for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
         listener.say(notice)
-    listener.begin(len(ready.viewers))
-    if options.dry_run or not ready.viewers:
+    listener.begin(len(ready.views))
+    if options.dry_run or not ready.views:
         return []
     out = ready.out
     with _connected(distributed, address) as client:
         write_settings(ready.stage, out)
-        tasks = [Task(folder / "job.yaml", out.job_sha, viewer.frame, options) for viewer in ready.viewers]
+        tasks = [Task(folder / "job.yaml", out.job_sha, view, options) for view in ready.views]
         records = _collect(distributed, client, tasks, listener)
         if records:
             # Once more from here: workers on a file system without locks may have lost some.
@@ -130,17 +130,17 @@ def _collect(distributed: Any, client: Any, tasks: Sequence[Task], listener: Lis
     dies while somebody still holds them.
     """
     run = uuid.uuid4().hex[:12]  # the same job may be sent twice, with other options
+    how = {"retries": _RETRIES, "pure": False}
     waiting = {
-        client.submit(render_task, task, retries=_RETRIES, pure=False, key=f"quilt-{run}-{task.frame}"): task
-        for task in tasks
+        client.submit(render_task, task, key=f"quilt-{run}-{task.view.name}", **how): task for task in tasks
     }
     records: list[FrameRecord] = []
     problems: list[Problem] = []
     with stop_between_frames() as request:
         try:
             for future in distributed.as_completed(list(waiting), loop=client.loop):
-                frame = waiting.pop(future).frame
-                record = _result(future, frame, problems, listener.say)
+                name = waiting.pop(future).view.name
+                record = _result(future, name, problems, listener.say)
                 future.release()
                 if record is not None:
                     records.append(record)
@@ -150,22 +150,22 @@ def _collect(distributed: Any, client: Any, tasks: Sequence[Task], listener: Lis
             client.cancel(list(waiting))
             raise
     raise_all(CheckFailedError, sorted(problems, key=lambda problem: problem.message))
-    return sorted(records, key=lambda record: record.frame)
+    return sorted(records, key=lambda record: (record.frame, record.eye))
 
 
 def _result(
-    future: Any, frame: int, problems: list[Problem], say: Callable[[str], None]
+    future: Any, name: str, problems: list[Problem], say: Callable[[str], None]
 ) -> FrameRecord | None:
     """The record of a finished frame; a failure is told now and noted for the end."""
     try:
         record: FrameRecord | None = future.result()
     except Exception as error:  # whatever befell the worker
         what = str(error) if isinstance(error, QuiltError) else f"{type(error).__name__}: {error}"
-        problems.append(Problem(f"frame {frame} failed: {' '.join(what.split())}"))
+        problems.append(Problem(f"frame {name} failed: {' '.join(what.split())}"))
         say(problems[-1].message)
         return None
     if record is None:
-        say(f"frame {frame} is complete already")
+        say(f"frame {name} is complete already")
     return record
 
 
@@ -180,9 +180,9 @@ def render_task(task: Task) -> FrameRecord | None:
         stage = _stage(task.job_file, task.job_sha)
     only = chosen_facets(stage, options.facets)
     out = outputs(stage, task.job_file.parent, task.job_sha, options.facets)
-    if not options.overwrite and only is None and frame_is_complete(stage, out, task.frame):
+    if not options.overwrite and only is None and view_is_complete(stage, out, task.view):
         return None
-    ready = Prepared(stage, out, tuple(viewer_path(stage.job, [task.frame])), only)
+    ready = Prepared(stage, out, (task.view,), only)
     [record] = render_frames(ready, options.threads or default_threads(), Listener())
     return record
 

@@ -1,95 +1,24 @@
 """One frame of the quilt: from a pose of the viewer to the pixels of all pages.
 
-`draw_frame` is all that happens a frame, in the order of the paper's pipeline: bin, then, batch by batch,
-prewarp, rasterize, shade.
+`draw_frame` is all that happens a frame, in the order of the paper's pipeline: the homographies of the
+facets, triangles sorted to facets, then, batch by batch, triangles warped, rasterized and shaded. Who
+does the work is told in `crew` and `workers`, what a batch is in `batch`, what lies in buffers in `buffers`.
 """
 
 from __future__ import annotations
 
-import os
-import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Protocol
-
 import numpy as np
 
-from quiltcli.display import Facets, lit_facets
-from quiltcli.geometry import BoolArray, IntArray, dot
-from quiltcli.projection.planar import QuiltRays, quilt_rays
-from quiltcli.render.batch import Drawn, draw_batch
-from quiltcli.render.buffers import Buffers, clear, clear_blocks, has_background, mends_itself
-from quiltcli.render.report import FrameRecord
+from quiltcli.display import lit_facets
+from quiltcli.geometry import BoolArray
+from quiltcli.projection.planar import quilt_rays
+from quiltcli.render.buffers import Buffers, empty_before, note_drawn, written_blocks
+from quiltcli.render.crew import Crew, Threads
+from quiltcli.render.notices import frame_warnings
+from quiltcli.render.report import Clock, FrameRecord
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame, batches
-from quiltcli.visibility.shares import Binned, BinPlan, bin_frame, bin_plan
-
-
-class Clock:
-    """Seconds by stage."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Add the time the block takes to the stage's."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-
-
-class Crew(Protocol):
-    """Whoever does the work of a frame that can be divided."""
-
-    @property
-    def workers(self) -> int:
-        """How many they are."""
-
-    def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
-        """Bin the scene."""
-
-    def clear(self, blocks: IntArray, buffers: Buffers) -> None:
-        """Empty the pixels of blocks."""
-
-    def draw(
-        self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
-    ) -> list[Drawn]:
-        """Draw batches, as `draw_batch`; `stale` are microtiles (M,) of all blocks."""
-
-
-@dataclass(frozen=True)
-class Threads:
-    """A crew of threads of this process."""
-
-    stage: Stage
-    workers: int
-
-    def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
-        """Bin the scene, in one thread."""
-        return bin_frame(plan_of(self.stage, viewer, rays))
-
-    def clear(self, blocks: IntArray, buffers: Buffers) -> None:
-        """Empty the pixels of blocks."""
-        clear_blocks(self.stage, blocks, buffers)
-
-    def draw(
-        self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
-    ) -> list[Drawn]:
-        """Draw batches, each in a thread."""
-
-        def drawn(batch: tuple[int, int]) -> Drawn:
-            return draw_batch(self.stage, frame, batch, buffers, stale[self.stage.blocks.tiles(batch)])
-
-        if self.workers == 1:
-            return list(map(drawn, work))
-        with ThreadPoolExecutor(self.workers) as pool:
-            return list(pool.map(drawn, work))
 
 
 def draw_frame(
@@ -117,8 +46,7 @@ def draw_frame(
     Returns:
         The frame's record.
     """
-    clock = Clock()
-    crew = crew or Threads(stage, threads)
+    clock, crew = Clock(), crew or Threads(stage, threads)
     lit = lit_facets(stage.facets, viewer.eye)
     if only is not None:
         lit &= only
@@ -126,26 +54,14 @@ def draw_frame(
         rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
         binned = crew.bin(viewer, rays)
     frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
-    written = frame.pairs.per_block > 0
-    stale = np.zeros(stage.blocks.used.size, dtype=np.bool_)
     with clock.stage("clear"):
-        if only is None and dirty is not None:
-            mended = written & mends_itself(stage)
-            stale = dirty & mended.repeat(np.diff(stage.blocks.tile_start))
-            crew.clear(np.flatnonzero(stage.blocks.any_tile(dirty) & ~mended), buffers)
-        else:
-            clear(stage, buffers, only)
+        stale = empty_before(stage, frame, buffers, only, dirty, crew.clear)
     with clock.stage("rasterize and shade"):
-        if has_background(stage):
-            written |= rays.lit[stage.blocks.facet]
-        work = batches(frame, written, crew.workers)
+        work = batches(frame, written_blocks(stage, frame), crew.workers)
         drawn = crew.draw(frame, work, buffers, stale)
         visible = sum(batch.visible for batch in drawn)
         if dirty is not None:
-            if only is None:
-                dirty[:] = False
-            for batch, done in zip(work, drawn, strict=True):
-                dirty[stage.blocks.tiles(batch)] |= done.tiles
+            note_drawn(stage, zip(work, (batch.tiles for batch in drawn), strict=True), only, dirty)
     return FrameRecord(
         frame=viewer.frame,
         triangles=binned.triangles,
@@ -158,38 +74,3 @@ def draw_frame(
         seconds=clock.seconds,
         warnings=tuple(frame_warnings(stage, viewer, lit, binned.facet_pairs, visible)),
     )
-
-
-def plan_of(stage: Stage, viewer: Viewer, rays: QuiltRays) -> BinPlan:
-    """How a frame of the stage is binned."""
-    culling = stage.job.render.backface_culling
-    return bin_plan(stage.scene, stage.parts, stage.blocks, viewer, rays, culling=culling)
-
-
-def frame_warnings(stage: Stage, viewer: Viewer, lit: BoolArray, pairs: int, visible: int) -> Iterator[str]:
-    """What a user should know of a frame that shows little or nothing."""
-    if not lit.any():
-        yield "the eye is behind every facet: nothing is lit"
-    elif not pairs:
-        yield "no triangle of the scene shows on any facet"
-    elif not visible:
-        yield "no pixel shows the scene"
-    if viewer.depth == "planar":
-        behind = int(np.count_nonzero(lit & facets_behind(stage.facets, viewer)))
-        if behind:
-            yield (
-                f"{behind} lit facets lie wholly behind the eye, where planar depth draws nothing"
-                " (render.depth: radial draws all around)"
-            )
-
-
-def facets_behind(facets: Facets, viewer: Viewer) -> BoolArray:
-    """Facets (F,) no corner of which lies ahead of the eye along the look direction."""
-    ahead = dot(facets.corners - viewer.eye, viewer.look)
-    result: BoolArray = np.maximum.reduceat(ahead, facets.corner_start[:-1]) <= 0
-    return result
-
-
-def default_threads() -> int:
-    """Cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

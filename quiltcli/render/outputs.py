@@ -13,27 +13,19 @@ import numpy as np
 from quiltcli import __version__
 from quiltcli.display import lit_facets
 from quiltcli.errors import OutputError, Problem, raise_all
-from quiltcli.formats.exr.image import (
-    Channel,
-    facet_attributes,
-    facet_path,
-    frame_attributes,
-    is_complete,
-    quilt_path,
-    read_exr,
-    read_header,
-    write_exr,
-)
+from quiltcli.formats.exr.image import Channel, read_exr, read_header, write_exr
 from quiltcli.formats.whole import link_whole, make_folder, remove_file, write_text
-from quiltcli.geometry import IntArray, facet_from_world
+from quiltcli.geometry import BoolArray, IntArray, facet_from_world
 from quiltcli.images.facets import facet_image, page_of
+from quiltcli.images.metadata import facet_attributes, is_complete, page_attributes, viewer_attributes
+from quiltcli.images.names import facet_path, quilt_path
 from quiltcli.images.window import cropped, frame_size, tight_window, whole_frame
 from quiltcli.job import dump_job
 from quiltcli.layout import Layout, write_layout
 from quiltcli.render.buffers import Buffers
-from quiltcli.render.frame import Clock
+from quiltcli.render.report import Clock
 from quiltcli.render.setup import Stage
-from quiltcli.viewer.viewer import Viewer, viewer_at
+from quiltcli.viewer.view import View
 
 
 @dataclass(frozen=True)
@@ -59,34 +51,44 @@ def outputs(stage: Stage, folder: Path, job_sha: str, facet_ids: Iterable[int] |
     return Outputs(folder, job_sha, np.flatnonzero(placed))
 
 
-def frame_files(stage: Stage, out: Outputs, frame: int) -> list[Path]:
-    """Every image of one frame."""
+def view_files(stage: Stage, out: Outputs, view: View) -> list[Path]:
+    """Every image of one view."""
     job = stage.job.output
-    pages = [quilt_path(out.folder, page + 1, frame) for page in range(len(stage.layout.pages))]
-    facets = [facet_path(out.folder, int(stage.layout.facet[row]), frame) for row in out.rows]
+    pages = [quilt_path(out.folder, page + 1, *view.key) for page in range(len(stage.layout.pages))]
+    facets = [facet_path(out.folder, int(stage.layout.facet[row]), *view.key) for row in out.rows]
     return pages * job.quilts + facets * job.facets
 
 
-def frame_is_complete(stage: Stage, out: Outputs, frame: int) -> bool:
-    """Whether every image of a frame is there, whole, and made by this job; one to be skipped may lack."""
-    missing = set(_skipped_files(stage, out, frame))
+def view_is_complete(stage: Stage, out: Outputs, view: View) -> bool:
+    """Whether every image of a view is there, whole, and made by this job; one to be skipped may lack."""
+    missing = set(_skipped_files(stage, out, view))
     return all(
-        is_complete(path, out.job_sha, frame) or (path in missing and not path.exists())
-        for path in frame_files(stage, out, frame)
+        is_complete(path, out.job_sha, view.frame) or (path in missing and not path.exists())
+        for path in view_files(stage, out, view)
     )
 
 
-def _skipped_files(stage: Stage, out: Outputs, frame: int) -> Iterator[Path]:
-    """Images of a frame that are not to be written, for their facets are not lit."""
+def _skipped_files(stage: Stage, out: Outputs, view: View) -> Iterator[Path]:
+    """Images of a view that are not to be written, for their facets are not lit."""
     if stage.job.output.facets and stage.job.output.unlit == "skip":
-        eye = viewer_at(stage.job.viewer, frame).eye
-        for row in out.rows[~lit_facets(stage.facets, eye)[out.rows]]:
-            yield facet_path(out.folder, int(stage.layout.facet[row]), frame)
+        for row in out.rows[~view_lit(stage, view)[out.rows]]:
+            yield facet_path(out.folder, int(stage.layout.facet[row]), *view.key)
 
 
-def refuse_to_overwrite(stage: Stage, out: Outputs, frames: Iterable[int]) -> None:
-    """Raise OutputError if any image of these frames exists; it names the first and counts the rest."""
-    present = [path for frame in frames for path in frame_files(stage, out, frame) if path.exists()]
+def view_lit(stage: Stage, view: View) -> BoolArray:
+    """Facets (F,) whose lit side faces the viewer they belong to."""
+    lit = np.zeros(stage.facets.count, dtype=np.bool_)
+    for viewer in view.viewers:
+        theirs = lit_facets(stage.facets, viewer.eye)
+        if viewer.facets is not None:
+            theirs &= np.isin(stage.layout.facet, viewer.facets)
+        lit |= theirs
+    return lit
+
+
+def refuse_to_overwrite(stage: Stage, out: Outputs, views: Iterable[View]) -> None:
+    """Raise OutputError if any image of these views exists; it names the first and counts the rest."""
+    present = [path for view in views for path in view_files(stage, out, view) if path.exists()]
     if present:
         more = f" and {len(present) - 1} more" if len(present) > 1 else ""
         message = f"exists already{more} (use --resume to keep finished frames, --overwrite to replace them)"
@@ -102,10 +104,8 @@ def write_settings(stage: Stage, out: Outputs) -> None:
     write_text(out.folder / "job.yaml", dump_job(stage.job, out.folder))
 
 
-def write_frame(
-    stage: Stage, out: Outputs, viewer: Viewer, buffers: Buffers, threads: int
-) -> dict[str, float]:
-    """Write the images of one frame, several files at a time.
+def write_view(stage: Stage, out: Outputs, view: View, buffers: Buffers, threads: int) -> dict[str, float]:
+    """Write the images of one view, several files at a time.
 
     Returns:
         Seconds by what was done, those of all threads together.
@@ -113,34 +113,35 @@ def write_frame(
     Raises:
         OutputError: a file cannot be written; those already written are whole.
     """
-    attributes = frame_attributes(viewer, stage.job.fps, out.job_sha, __version__)
     total: dict[str, float] = {}
     with ThreadPoolExecutor(threads) as pool:
-        work = _work(stage, out, viewer, buffers, attributes)
+        work = _work(stage, out, view, buffers)
         for each in [pool.submit(*task) for task in work]:
             for name, seconds in each.result().items():
                 total[name] = total.get(name, 0.0) + seconds
     return total
 
 
-def _work(
-    stage: Stage, out: Outputs, viewer: Viewer, buffers: Buffers, attributes: dict[str, object]
-) -> Iterator[tuple[Any, ...]]:
-    """What there is to do for one frame: functions that give seconds, and their arguments."""
+def _work(stage: Stage, out: Outputs, view: View, buffers: Buffers) -> Iterator[tuple[Any, ...]]:
+    """What there is to do for one view: functions that give seconds, and their arguments."""
     how, layout = stage.job.output, stage.layout
+    attributes = page_attributes(view, stage.job.fps, out.job_sha, __version__)
     if how.quilts:
         for page in range(len(layout.pages)):
-            yield _write_page, stage, out, page, buffers, attributes
+            path = quilt_path(out.folder, page + 1, *view.key)
+            yield _write_page, stage, path, page, buffers, attributes | {"quilt:page": page + 1}
     if not how.facets:
         return
     maps = facet_from_world(layout.origin, layout.du, layout.dv)
-    apart = ~lit_facets(stage.facets, viewer.eye)[out.rows] & (how.unlit != "write")
+    apart = ~view_lit(stage, view)[out.rows] & (how.unlit != "write")
     for row in out.rows[~apart].tolist():
-        own = attributes | facet_attributes(int(layout.facet[row]), maps[row])
-        yield _write_facet, stage, out, row, buffers, own
+        facet = int(layout.facet[row])
+        own = viewer_attributes(view, facet, stage.job.fps, out.job_sha, __version__)
+        path = facet_path(out.folder, facet, *view.key)
+        yield _write_facet, stage, path, row, buffers, own | facet_attributes(facet, maps[row])
     if apart.any():
         for rows in _by_size(layout, out.rows[apart]):
-            paths = [facet_path(out.folder, int(layout.facet[row]), viewer.frame) for row in rows]
+            paths = [facet_path(out.folder, int(layout.facet[row]), *view.key) for row in rows]
             if how.unlit == "skip":
                 yield _remove, paths
             else:
@@ -155,24 +156,22 @@ def _by_size(layout: Layout, rows: IntArray) -> Iterator[list[int]]:
 
 
 def _write_page(
-    stage: Stage, out: Outputs, page: int, buffers: Buffers, attributes: dict[str, object]
+    stage: Stage, path: Path, page: int, buffers: Buffers, attributes: dict[str, object]
 ) -> dict[str, float]:
     """Write one page of the quilt."""
     clock = Clock()
     pixels = {name: page_of(flat, stage.layout, page) for name, flat in buffers.items()}
-    path = quilt_path(out.folder, page + 1, int(str(attributes["quilt:frame"])))
-    _write(stage, path, pixels, attributes | {"quilt:page": page + 1}, clock)
+    _write(stage, path, pixels, attributes, clock)
     return clock.seconds
 
 
 def _write_facet(
-    stage: Stage, out: Outputs, row: int, buffers: Buffers, attributes: dict[str, object]
+    stage: Stage, path: Path, row: int, buffers: Buffers, attributes: dict[str, object]
 ) -> dict[str, float]:
     """Write the image of one facet."""
     clock = Clock()
     with clock.stage("cut"):
         pixels = facet_image(buffers, stage.layout, row, stage.owners)
-    path = facet_path(out.folder, int(stage.layout.facet[row]), int(str(attributes["quilt:frame"])))
     _write(stage, path, pixels, attributes, clock)
     return clock.seconds
 
@@ -215,20 +214,20 @@ def _write(
         write_exr(path, pixels, attributes, how.compression, data_window=window, display_window=frame)
 
 
-def merge_problems(stage: Stage, out: Outputs, frames: Iterable[int]) -> list[Problem]:
-    """What keeps facets from being merged into the quilts of these frames."""
-    return [problem for frame in frames for _, problem in _pages_on_disk(stage, out, frame) if problem]
+def merge_problems(stage: Stage, out: Outputs, views: Iterable[View]) -> list[Problem]:
+    """What keeps facets from being merged into the quilts of these views."""
+    return [problem for view in views for _, problem in _pages_on_disk(stage, out, view) if problem]
 
 
-def read_quilt(stage: Stage, out: Outputs, frame: int, buffers: Buffers) -> None:
+def read_quilt(stage: Stage, out: Outputs, view: View, buffers: Buffers) -> None:
     """Fill `buffers` with the quilt that is on disk, for facets to be merged into.
 
     Raises:
         OutputError: a page is missing, damaged, of another size, has other channels, or another job's.
     """
-    raise_all(OutputError, merge_problems(stage, out, [frame]))
+    raise_all(OutputError, merge_problems(stage, out, [view]))
     for page in range(len(stage.layout.pages)):
-        path = quilt_path(out.folder, page + 1, frame)
+        path = quilt_path(out.folder, page + 1, *view.key)
         image = read_exr(path)
         if missing := sorted(set(buffers) - set(image.channels)):
             raise OutputError(Problem(f"lacks the channels {', '.join(missing)}", str(path)))
@@ -237,10 +236,10 @@ def read_quilt(stage: Stage, out: Outputs, frame: int, buffers: Buffers) -> None
             page_of(buffers[name], stage.layout, page)[:] = channels[name]
 
 
-def _pages_on_disk(stage: Stage, out: Outputs, frame: int) -> Iterator[tuple[int, Problem | None]]:
-    """Every page of the frame's quilt, with what is wrong with its file; no pixel is read."""
+def _pages_on_disk(stage: Stage, out: Outputs, view: View) -> Iterator[tuple[int, Problem | None]]:
+    """Every page of the view's quilt, with what is wrong with its file; no pixel is read."""
     for page, (width, height) in enumerate(stage.layout.pages.tolist()):
-        path = quilt_path(out.folder, page + 1, frame)
+        path = quilt_path(out.folder, page + 1, *view.key)
         if not path.exists():
             yield (
                 page,

@@ -20,6 +20,22 @@ if TYPE_CHECKING:
 _FORMAT = 1
 
 
+class Clock:
+    """Seconds by stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextlib.contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Add the time the block takes to the stage's."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
 @dataclass(frozen=True)
 class FrameRecord:
     """Counts, times and warnings of one frame; the figures are those the method's paper reports.
@@ -39,6 +55,7 @@ class FrameRecord:
         wall_seconds: from the end of the frame before to the end of this one: the frames' sum is the run's.
         write_seconds: time in the writer's threads, all together, by what they did.
         warnings: sentences for the user.
+        eye: `left` or `right`, empty where there is one eye.
     """
 
     frame: int
@@ -53,6 +70,7 @@ class FrameRecord:
     wall_seconds: float = 0.0
     write_seconds: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    eye: str = ""
 
     @property
     def settled_share(self) -> float:
@@ -89,27 +107,48 @@ class FrameRecord:
         entry = asdict(self)
         warnings = entry.pop("warnings")
         times = {name: entry.pop(name) for name in ("wall_seconds", "seconds", "write_seconds")}
+        eye = {"eye": eye} if (eye := entry.pop("eye")) else {}
         shares = {"settled_share": self.settled_share, "replication": self.replication}
-        return entry | shares | times | {"warnings": list(warnings)}
+        return {"frame": entry.pop("frame")} | eye | entry | shares | times | {"warnings": list(warnings)}
+
+
+def together(records: Sequence[FrameRecord]) -> FrameRecord:
+    """One record of parts of a frame that were drawn one after the other, each on facets of its own."""
+    first, *others = records
+    for record in others:
+        counts = ("reaching", "pairs", "settled", "lit_facets", "visible_pixels")
+        first = replace(
+            first,
+            **{name: getattr(first, name) + getattr(record, name) for name in counts},
+            triangles=max(first.triangles, record.triangles),
+            seconds=_summed((first.seconds, record.seconds)),
+            warnings=tuple(dict.fromkeys((*first.warnings, *record.warnings))),
+        )
+    return first
 
 
 def write_report(path: Path, job_sha: str, version: str, records: Iterable[FrameRecord]) -> None:
-    """Write `report.json`, whole or not at all, with one entry a frame, sorted by frame.
+    """Write `report.json`, whole or not at all, with one entry a frame and eye, sorted by them.
 
     Frames of the same job that the file already holds are kept, those rendered again are replaced:
     a sequence rendered in pieces ends with the same report as one rendered in one go, times apart.
     A report of another job is replaced. Raises OutputError.
     """
     with _alone_in(path.parent):
-        frames = {entry["frame"]: entry for entry in _known_frames(path, job_sha)}
-        frames |= {record.frame: record.as_json() for record in records}
+        frames = {_key(entry): entry for entry in _known_frames(path, job_sha)}
+        frames |= {_key(entry): entry for entry in (record.as_json() for record in records)}
         report = {
             "quilt_report": _FORMAT,
             "version": version,
             "job": job_sha,
-            "frames": [frames[frame] for frame in sorted(frames)],
+            "frames": [frames[key] for key in sorted(frames)],
         }
         write_text(path, json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def _key(entry: Mapping[str, Any]) -> tuple[int, str]:
+    """What tells the entry from all others: frame and eye."""
+    return entry["frame"], str(entry.get("eye", ""))
 
 
 def _known_frames(path: Path, job_sha: str) -> list[dict[str, Any]]:

@@ -1,16 +1,16 @@
 """The walk from a job to its images.
 
-job → display, layout, scene            once (`draw.set_stage`)
-frame → viewer                          a function of the frame number
-    bin, prewarp, rasterize, shade      `draw.draw_frame`, or another of `methods`
-    unmap, write                        `outputs.write_frame`
+job → display, layout, scene            once (`setup.set_stage`)
+frame → views                           a function of the frame number (`viewer.view`)
+    bin, warp, rasterize, shade         `frame.draw_frame`, or another of `methods`
+    unmap, write                        `outputs.write_view`
 """
 
 from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -20,30 +20,30 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.display import pitch_mm
 from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, raise_all
 from quiltcli.formats.exr.image import use_threads
 from quiltcli.geometry import BoolArray
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.render.buffers import Buffers, new_buffers
-from quiltcli.render.frame import default_threads
+from quiltcli.render.crew import default_threads
 from quiltcli.render.interrupt import stop_between_frames
-from quiltcli.render.methods import draw_frame
+from quiltcli.render.methods import draw_view
+from quiltcli.render.notices import stage_warnings
 from quiltcli.render.outputs import (
     Outputs,
-    frame_is_complete,
     merge_problems,
     outputs,
     read_quilt,
     refuse_to_overwrite,
-    write_frame,
+    view_is_complete,
     write_settings,
+    write_view,
 )
 from quiltcli.render.report import FrameRecord, write_report
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.render.workers import Pool, can_fork, shared_buffers, worth_forking
 from quiltcli.viewer.edge_on import eye_problems
-from quiltcli.viewer.viewer import Viewer, check_viewer, viewer_at
+from quiltcli.viewer.view import View, views_of
 
 
 @dataclass(frozen=True)
@@ -91,13 +91,13 @@ class Prepared:
     Attributes:
         stage: what the frames share.
         out: where the files go.
-        viewers: the viewers of the frames that are left to draw.
+        views: what is left to draw.
         only: (F,) the only facets to draw, None for all.
     """
 
     stage: Stage
     out: Outputs
-    viewers: tuple[Viewer, ...]
+    views: tuple[View, ...]
     only: BoolArray | None
 
 
@@ -123,7 +123,7 @@ def render(
     ready = prepare(job, options)
     for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
         listener.say(notice)
-    if options.dry_run or not ready.viewers:
+    if options.dry_run or not ready.views:
         return []
     write_settings(ready.stage, ready.out)
     return render_frames(ready, options.threads or default_threads(), listener, start)
@@ -136,24 +136,25 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
         QuiltError: bad input, or files that are in the way.
     """
     frames = list(job.frames if options.frames is None else options.frames)
-    viewers = viewer_path(job, frames)
+    views = views_of(job, frames)
     stage = set_stage(job)
+    viewers = [viewer for view in views for viewer in view.viewers]
     raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
     only = chosen_facets(stage, options.facets)
     out = outputs(stage, options.folder or job.output.directory, job_sha256(job), options.facets)
     if only is not None:
-        raise_all(OutputError, merge_problems(stage, out, frames))
+        raise_all(OutputError, merge_problems(stage, out, views))
     elif options.resume:
-        viewers = [viewer for viewer in viewers if not frame_is_complete(stage, out, viewer.frame)]
+        views = [view for view in views if not view_is_complete(stage, out, view)]
     elif not options.overwrite:
-        refuse_to_overwrite(stage, out, frames)
-    return Prepared(stage, out, tuple(viewers), only)
+        refuse_to_overwrite(stage, out, views)
+    return Prepared(stage, out, tuple(views), only)
 
 
 def render_frames(
     ready: Prepared, threads: int, listener: Listener, start: float | None = None
 ) -> list[FrameRecord]:
-    """Draw and write the frames; while one is written, the next is drawn into other buffers.
+    """Draw and write the views; while one is written, the next is drawn into other buffers.
 
     Args:
         ready: what to draw.
@@ -161,26 +162,24 @@ def render_frames(
         listener: told of every finished frame.
         start: when the run began, by `time.perf_counter`; None for now.
     """
-    stage, viewers = ready.stage, ready.viewers
+    stage, views = ready.stage, ready.views
     pooled = threads > 1 and can_fork() and worth_forking(stage)
-    sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in viewers[:2]]
+    sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in views[:2]]
     # Forked before this process has threads of its own: a lock that one holds would stay locked.
     with ExitStack() as ends:
         pool = ends.enter_context(Pool(stage, sheets, threads)) if pooled else None
-        listener.begin(len(viewers))
+        listener.begin(len(views))
         request = ends.enter_context(stop_between_frames())
         writer = ends.enter_context(Writer(ready, threads, listener, start))
         dirty = [np.zeros(stage.blocks.used.size, dtype=np.bool_) for _ in sheets]
-        for number, viewer in enumerate(viewers):
+        for number, view in enumerate(views):
             request.check()
             turn = number % len(sheets)
             writer.leave(len(sheets) - 1)
             if ready.only is not None:
-                read_quilt(stage, ready.out, viewer.frame, sheets[turn])
-            record = draw_frame(
-                stage, viewer, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool
-            )
-            writer.take(record, viewer, sheets[turn])
+                read_quilt(stage, ready.out, view, sheets[turn])
+            record = draw_view(stage, view, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool)
+            writer.take(record, view, sheets[turn])
         writer.leave(0)
         request.check()
     return writer.records
@@ -217,10 +216,10 @@ class Writer:
         finally:
             self._executor.shutdown()
 
-    def take(self, record: FrameRecord, viewer: Viewer, buffers: Buffers) -> None:
+    def take(self, record: FrameRecord, view: View, buffers: Buffers) -> None:
         """Write a frame; its buffers must not change until `leave` has let it go."""
         stage, out = self._ready.stage, self._ready.out
-        work = partial(write_frame, stage, out, viewer, buffers, self._threads)
+        work = partial(write_view, stage, out, view, buffers, self._threads)
         record = record.after("load", self._load)
         self._load = 0.0
         self._waiting.append(self._executor.submit(record.written, work))
@@ -239,16 +238,6 @@ class Writer:
             self._listener.frame_done(record)
 
 
-def viewer_path(job: JobFile, frames: Sequence[int]) -> list[Viewer]:
-    """The viewer of every frame.
-
-    Raises:
-        ViewerError: with every problem of the path.
-    """
-    raise_all(ViewerError, check_viewer(job.viewer, frames))
-    return [viewer_at(job.viewer, frame, job.render.depth) for frame in frames]
-
-
 def chosen_facets(stage: Stage, ids: Sequence[int] | None) -> BoolArray | None:
     """The facets (F,) with these ids, None for all.
 
@@ -265,18 +254,3 @@ def chosen_facets(stage: Stage, ids: Sequence[int] | None) -> BoolArray | None:
             raise JobError(f"--facets: facet {facet} is not enabled and has no place in the layout")
         chosen[facet - 1] = True
     return chosen
-
-
-def stage_warnings(stage: Stage) -> Iterator[str]:
-    """What is worth a second look before rendering starts."""
-    least, greatest = pitch_mm(stage.facets)
-    if least < 0.1 or greatest > 100:
-        yield (
-            f"the pixel pitch is {least:.3g} to {greatest:.3g} mm, outside 0.1 to 100 mm:"
-            " are the display's units and resolution right?"
-        )
-    if stage.job.render.bleed > stage.layout.padding:
-        yield (
-            f"the bleed of {stage.job.render.bleed} pixels is wider than the layout's padding of"
-            f" {stage.layout.padding}: neighbours share what lies between them"
-        )

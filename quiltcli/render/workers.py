@@ -26,14 +26,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.channels import exr_channels
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
 from quiltcli.projection.planar import QuiltRays, quilt_rays
 from quiltcli.render.batch import Drawn, draw_batch
 from quiltcli.render.buffers import Buffers, clear_blocks
-from quiltcli.render.frame import Threads, plan_of
+from quiltcli.render.crew import Threads, plan_of
 from quiltcli.render.setup import Stage
-from quiltcli.shading.aovs import exr_channels
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import BlockPairs, Frame, pairs_by_block
 from quiltcli.visibility.shares import (

@@ -1,6 +1,6 @@
-"""Channels: what can be written for each visible pixel, one row of a table each.
+"""What each channel holds: a function a channel, from scene, viewer and hits to values.
 
-To add a channel, add a row to `CHANNELS` and its name to the job's list of channels.
+The schema of the channels is `quiltcli.channels`; a channel is a row there and one of `SOURCES` here.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.channels import CHANNELS, MOST_HALF
 from quiltcli.geometry import FloatArray
 from quiltcli.scene import Scene
 from quiltcli.shading.adaptive import pixel_colors
 from quiltcli.shading.nodes import NodeColors
-from quiltcli.shading.shade import MOST_HALF, shading_normals, shading_wants
+from quiltcli.shading.shade import shading_normals, shading_wants
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.resolve.hits import Hits, Wanted
 
@@ -24,21 +25,15 @@ Values: TypeAlias = NDArray[Any]
 
 
 @dataclass(frozen=True)
-class Channel:
-    """One job channel.
+class Source:
+    """Where a channel's values come from.
 
     Attributes:
-        layers: names of its EXR channels.
-        dtype: their pixel type.
-        empty: value of a pixel that sees nothing.
         values: from scene, viewer and hits to an array for each layer, (G, k), (G, 1) where a group's
             pixels all have one value, or (1, 1) where all have, of any float or integer type.
         wanted: what of the hits that takes beside triangle and depth.
     """
 
-    layers: tuple[str, ...]
-    dtype: np.dtype[Any]
-    empty: float
     values: Callable[[Scene, Viewer, Hits], Values | Sequence[Values]]
     wanted: Callable[[Scene], Wanted] = lambda _: Wanted()
 
@@ -88,38 +83,23 @@ def _point(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
 
 _SCALE = 2.0**-112
 _MOST_SCALED = MOST_HALF * np.float32(_SCALE)
-_HALF, _FLOAT, _UINT = np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.uint32)
 
-# Depths are measured in double precision and rounded once. A pixel that sees nothing is infinitely
-# far in `zv` as well as in `Z`, so that it cannot be taken for one on the far plane, where zv is 1.
-CHANNELS: dict[str, Channel] = {
-    "rgba": Channel(("R", "G", "B", "A"), _HALF, 0.0, _rgba, shading_wants),
-    "Z": Channel(("Z",), _FLOAT, np.inf, _depth),
-    "zv": Channel(("zv",), _FLOAT, np.inf, _canonical_depth),
-    "facet": Channel(("facet",), _UINT, 0.0, _facet),
-    "object": Channel(("object",), _UINT, 0.0, _object),
-    "triangle": Channel(("triangle",), _UINT, 0.0, _triangle),
-    "N": Channel(
-        ("N.X", "N.Y", "N.Z"), _HALF, 0.0, _normal, lambda scene: Wanted(normals=scene.corner_normals)
-    ),
-    "P": Channel(("P.X", "P.Y", "P.Z"), _FLOAT, 0.0, _point, lambda _: Wanted(position=True)),
+# Depths are measured in double precision and rounded once.
+SOURCES: dict[str, Source] = {
+    "rgba": Source(_rgba, shading_wants),
+    "Z": Source(_depth),
+    "zv": Source(_canonical_depth),
+    "facet": Source(_facet),
+    "object": Source(_object),
+    "triangle": Source(_triangle),
+    "N": Source(_normal, lambda scene: Wanted(normals=scene.corner_normals)),
+    "P": Source(_point, lambda _: Wanted(position=True)),
 }
-
-
-def exr_channels(names: Iterable[str]) -> dict[str, tuple[np.dtype[Any], float]]:
-    """Pixel type and empty value of every EXR channel that the job channels `names` bring, in order."""
-    rows = [CHANNELS[name] for name in names]
-    return {layer: (row.dtype, row.empty) for row in rows for layer in row.layers}
-
-
-def empty_buffers(names: Iterable[str], pixels: int) -> dict[str, Values]:
-    """A flat buffer (pixels,) for every EXR channel, in which nothing is seen yet."""
-    return {layer: np.full(pixels, empty, dtype) for layer, (dtype, empty) in exr_channels(names).items()}
 
 
 def wanted_for(names: Iterable[str], scene: Scene) -> Wanted:
     """What the hits have to tell for these channels."""
-    each = [CHANNELS[name].wanted(scene) for name in names]
+    each = [SOURCES[name].wanted(scene) for name in names]
     return Wanted(
         normals=next((one.normals for one in each if one.normals is not None), None),
         weights=any(one.weights for one in each),
@@ -132,8 +112,8 @@ def fill(
 ) -> None:
     """Write the channels `names` of all hits into flat `buffers`, at the pixels the hits belong to."""
     for name in names:
-        row = CHANNELS[name]
-        for layer, values in zip(row.layers, row.values(scene, viewer, hits), strict=True):
+        values_of = SOURCES[name].values
+        for layer, values in zip(CHANNELS[name].layers, values_of(scene, viewer, hits), strict=True):
             hits.put(buffers[layer], values)
 
 

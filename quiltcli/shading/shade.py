@@ -26,8 +26,6 @@ HEADLIGHT = 3.0
 LEAST_ROUGHNESS = 0.09
 # Nearer to a point light than this, in metres, its light does not grow any more.
 LEAST_DISTANCE = 1e-3
-# The largest finite half float; brighter values are written as this.
-MOST_HALF = np.float32(65504)
 _DIELECTRIC = 0.04
 _LEAST_COSINE = np.float32(1e-4)
 _LEAST_DISTANCE2 = np.float32(LEAST_DISTANCE**2)

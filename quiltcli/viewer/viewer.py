@@ -5,12 +5,11 @@ A pose is a pure function of the frame number, so any chunk of a sequence can be
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.errors import Problem, QuiltError, ViewerError
+from quiltcli.errors import ViewerError
 from quiltcli.geometry import FloatArray, cross, normalized
 from quiltcli.job import PathSpec, ViewerSpec
 from quiltcli.viewer.paths import PATHS, Pose
@@ -28,6 +27,9 @@ class Viewer:
         near: nearest depth that is drawn, metres.
         far: farthest depth that is drawn, metres.
         depth: `planar` measures Z along `look`; `radial` is the distance from the eye.
+        head: (3,) place between the eyes, world metres; None where there is one eye, at the head's place.
+        name: of whoever looks, empty where there is nobody else.
+        facets: ids of the only facets that are theirs; None for all.
     """
 
     frame: int
@@ -37,6 +39,9 @@ class Viewer:
     near: float
     far: float
     depth: str
+    head: FloatArray | None = None
+    name: str = ""
+    facets: tuple[int, ...] | None = None
 
     @property
     def camera_from_world(self) -> FloatArray:
@@ -54,7 +59,7 @@ class Viewer:
         return np.asarray(x * self.look[0] + y * self.look[1] + z * self.look[2])
 
 
-def viewer_at(spec: ViewerSpec, frame: int, depth: str = "planar") -> Viewer:
+def viewer_at(spec: ViewerSpec, frame: int, depth: str) -> Viewer:
     """The viewer of one frame.
 
     Args:
@@ -85,19 +90,6 @@ def viewer_at(spec: ViewerSpec, frame: int, depth: str = "planar") -> Viewer:
         )
     up = normalized(cross(normalized(right), look))
     return Viewer(frame, pose.eye, look, up, spec.near, spec.far, depth)
-
-
-def check_viewer(spec: ViewerSpec, frames: Iterable[int]) -> list[Problem]:
-    """Problems of the path over some frames, each said once."""
-    problems: list[Problem] = []
-    for frame in frames:
-        try:
-            viewer_at(spec, frame)
-        except QuiltError as error:
-            problems += error.problems
-            if len(problems) >= 20:
-                break
-    return list(dict.fromkeys(problems))
 
 
 def _pose(path: PathSpec, frame: int) -> Pose:

@@ -29,7 +29,7 @@ from quiltcli.projection.camera import camera_display, raster_display
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.setup import set_stage
-from quiltcli.viewer.viewer import viewer_at
+from quiltcli.viewer.view import views_at
 from tests.helpers.flat_displays import PITCH
 from tests.helpers.sky_scene import sky_job
 from tests.helpers.tiny_job import write_tiny_job
@@ -41,8 +41,9 @@ MODELS = Path(__file__).parents[2] / "display_models"
 def staged(job, folder: Path):
     """Stage, viewer and images of a job's first frame."""
     stage = set_stage(with_channels(job, ("rgba",)))
-    who = viewer_at(stage.job.viewer, 1)
-    shown, _ = shown_images(stage, who, folder / "none", "", 1)
+    view = views_at(stage.job, 1)[0]
+    who = view.viewer
+    shown, _ = shown_images(stage, view, folder / "none", "", 1)
     return stage, who, shown
 
 

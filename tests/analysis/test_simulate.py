@@ -20,7 +20,7 @@ from quiltcli.layout import pixel_owners
 from quiltcli.projection.camera import camera_display
 from quiltcli.render.sequence import render
 from quiltcli.render.setup import set_stage
-from quiltcli.viewer.viewer import viewer_at
+from quiltcli.viewer.view import views_at
 from tests.helpers.flat_displays import PITCH, flat_display, moved, placed, rectangle
 
 MODELS = Path(__file__).parents[2] / "display_models"
@@ -82,8 +82,9 @@ def test_no_error_at_all_where_the_scene_is_even(tmp_path):
 
 def test_nearest_shows_exactly_the_pixel_it_names(tmp_path):
     stage = set_stage(with_channels(job(tmp_path, "cube5", "600"), ("rgba",)))
-    viewer = viewer_at(stage.job.viewer, 1)
-    shown, _ = shown_images(stage, viewer, tmp_path / "none", "", 1)
+    view = views_at(stage.job, 1)[0]
+    viewer = view.viewer
+    shown, _ = shown_images(stage, view, tmp_path / "none", "", 1)
     through = camera_display(viewer, 160, 120, 50)
     facet = visible_facets(stage, viewer, through, 1)
     light, lit = displayed_light(shown, viewer, through, facet, "nearest")

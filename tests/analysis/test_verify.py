@@ -14,7 +14,8 @@ from quiltcli.analysis.verify import VerifyOptions, verdict_rows, verify
 from quiltcli.analysis.verify.pixels import sight
 from quiltcli.cli import main
 from quiltcli.errors import MissingExtraError
-from quiltcli.formats.exr.image import quilt_path, read_exr, write_exr
+from quiltcli.formats.exr.image import read_exr, write_exr
+from quiltcli.images.names import quilt_path
 from quiltcli.render.sequence import render
 from tests.helpers.in_memory import CUBE, CUBE_FACES
 from tests.helpers.verified_jobs import EVERY, cube_job, found, shoot, write_job

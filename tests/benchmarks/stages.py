@@ -14,7 +14,7 @@ from quiltcli.job import JobFile, ResolutionSpec, load_display_file
 from quiltcli.layout import align
 from quiltcli.layout.packing import pack
 from quiltcli.projection.planar import quilt_rays
-from quiltcli.render.frame import plan_of
+from quiltcli.render.crew import plan_of
 from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene import Scene
 from quiltcli.shading.shade import shading_wants

@@ -13,8 +13,7 @@ from contextlib import ExitStack, contextmanager
 from types import GeneratorType
 from typing import Any
 
-from quiltcli.render import batch
-from quiltcli.render import frame as draw
+from quiltcli.render import batch, buffers, crew
 from quiltcli.shading import aovs as channels
 from quiltcli.shading.adaptive import NodeShader
 from quiltcli.visibility import draw as raster
@@ -22,7 +21,7 @@ from quiltcli.visibility import shares as binframe
 from quiltcli.visibility.binning import pairs as binning
 
 STAGES: tuple[tuple[object, str, str], ...] = (
-    (draw, "bin_frame", "bin"),
+    (crew, "bin_frame", "bin"),
     (binframe, "see_vertices", "bin: first pass"),
     (binning, "_second_pass", "bin: second pass"),
     (binframe, "block_keys", "prewarp"),
@@ -36,8 +35,8 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (channels, "pixel_colors", "shade"),
     (channels, "_halves_between", "shade"),
     (batch, "fill", "store"),
-    (draw, "clear", "clear"),
-    (draw, "clear_blocks", "clear"),
+    (buffers, "clear", "clear"),
+    (crew, "clear_blocks", "clear"),
 )
 """Module or class, function, and the stage whose time it is."""
 

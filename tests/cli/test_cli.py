@@ -321,12 +321,12 @@ def test_facets_are_only_merged_into_their_own_job(tiny: Path) -> None:
 SLOW = """
 import sys, time
 import quiltcli.render.sequence as render
-draw = render.draw_frame
-def slow(stage, viewer, *rest, **how):
-    print("drawing", viewer.frame, flush=True)
+draw = render.draw_view
+def slow(stage, view, *rest, **how):
+    print("drawing", view.frame, flush=True)
     time.sleep(0.3)
-    return draw(stage, viewer, *rest, **how)
-render.draw_frame = slow
+    return draw(stage, view, *rest, **how)
+render.draw_view = slow
 from quiltcli.cli import main
 main.main(["render", "job.yaml"], prog_name="quilt")
 """

@@ -30,7 +30,7 @@ from quiltcli.job import load_display_file, load_job, load_scene_file
 from quiltcli.layout import pixel_owners, quilt_polygons, read_layout
 from quiltcli.render.sequence import render
 from quiltcli.scene import load_scene
-from quiltcli.viewer.viewer import viewer_at
+from quiltcli.viewer.view import viewers_of
 from tests.helpers.flat_displays import flat_display, moved, placed, rectangle
 from tests.helpers.tiny_job import replaced, write_tiny_job
 
@@ -95,12 +95,12 @@ def test_the_page_holds_the_display_where_it_is(out, written):
     quilt = unpacked(data["mesh"]["quilt"], "<f4").reshape(-1, 2)
     assert (quilt == quilt_polygons(stage.layout).astype(np.float32)).all()
     assert unpacked(data["mesh"]["page"], "<i4").tolist() == stage.layout.page.tolist()
-    viewer = viewer_at(stage.job.viewer, 2)
+    viewer = viewers_of(stage.job, [2])[0]
     entry = data["frames"][0]
     assert np.abs(np.array(entry["eye"]) + data["centre"] - viewer.eye).max() < 1e-12
     assert unpacked(entry["lit"], "u1").tolist() == [1, 0]  # the right wall shows its back
     path = unpacked(data["path"], "<f4").reshape(-1, 3) + data["centre"]
-    assert np.abs(path - [viewer_at(stage.job.viewer, f).eye for f in (1, 2, 3, 4)]).max() < 1e-6
+    assert np.abs(path - [viewers_of(stage.job, [f])[0].eye for f in (1, 2, 3, 4)]).max() < 1e-6
 
 
 def test_the_page_names_nothing_that_could_be_loaded(written):
@@ -462,7 +462,7 @@ def test_the_model_has_dark_sides_and_the_eye(out, written):
     assert (front == back[:, ::-1]).all()
     eye = next(node for node in document["nodes"] if "camera" in node)
     matrix = np.array(eye["matrix"]).reshape(4, 4).T
-    assert np.abs(matrix[:3, 3] - viewer_at(open_folder(out).stage.job.viewer, 2).eye).max() < 1e-12
+    assert np.abs(matrix[:3, 3] - viewers_of(open_folder(out).stage.job, [2])[0].eye).max() < 1e-12
     assert np.abs(matrix[:3, :3].T @ matrix[:3, :3] - np.eye(3)).max() < 1e-12
     assert np.linalg.det(matrix) == pytest.approx(1)
 

@@ -15,7 +15,7 @@ from quiltcli.images.preview import tone_map
 from quiltcli.job import load_display_file, load_job
 from quiltcli.projection.camera import frame_display
 from quiltcli.render.sequence import render
-from quiltcli.viewer.viewer import viewer_at
+from quiltcli.viewer.view import viewers_of
 from tests.helpers.chromium import chromium, look
 
 ROOT = Path(__file__).parents[2]
@@ -68,7 +68,7 @@ def test_from_the_eye_it_is_the_picture_of_the_simulation(job, tmp_path):
 
 def test_from_aside_it_is_bent_as_the_simulation_says(job, tmp_path):
     place = (-0.35, 0.55, 1.05)
-    viewer = replace(viewer_at(job.viewer, 2), eye=np.array(place), up=np.array([0.0, 1.0, 0.0]))
+    viewer = replace(viewers_of(job, [2])[0], eye=np.array(place), up=np.array([0.0, 1.0, 0.0]))
     corners = load_display(load_display_file(job.display)).corners
     camera, fov = frame_display(viewer, corners, SIZE[0] / SIZE[1], turn=True)
     numbers = ",".join(f"{value:.12g}" for value in (*camera.eye, *camera.look, *camera.up, fov))

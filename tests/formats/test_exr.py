@@ -10,41 +10,11 @@ import pytest
 
 from quiltcli.errors import OutputError
 from quiltcli.formats.exr import image as exr
-from quiltcli.formats.exr.image import (
-    Image,
-    facet_path,
-    is_complete,
-    quilt_path,
-    read_exr,
-    read_header,
-    write_exr,
-)
+from quiltcli.formats.exr.image import Image, read_exr, read_header, write_exr
 from quiltcli.formats.whole import make_folder, temporary_path, write_text
-from quiltcli.viewer.viewer import Viewer
+from tests.helpers.noise_images import noise, provenance
 
-VIEWER = Viewer(
-    frame=-7,
-    eye=np.array([0.1, 1.6, 2.5]),
-    look=np.array([0.0, 0.0, -1.0]),
-    up=np.array([0.0, 1.0, 0.0]),
-    near=0.05,
-    far=50.0,
-    depth="planar",
-)
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256", "lj2k")
-
-
-def noise(height=40, width=50, seed=1):
-    rng = np.random.default_rng(seed)
-    channels = {name: rng.standard_normal((height, width)).astype(np.float16) for name in "RGBA"}
-    channels["Z"] = np.where(rng.random((height, width)) < 0.3, np.inf, rng.random((height, width)))
-    channels["Z"] = channels["Z"].astype(np.float32)
-    channels["triangle"] = rng.integers(0, 2**32, (height, width), dtype=np.uint32)
-    return channels
-
-
-def provenance():
-    return exr.frame_attributes(VIEWER, Fraction(30000, 1001), "ab" * 32, "0.1.0")
 
 
 def assert_same_channels(expected, actual):
@@ -114,32 +84,6 @@ def test_what_is_read_owns_its_memory(tmp_path):
     image.channels["R"][:] = 0
     assert_same_channels(channels, read_exr(path).channels)
     assert all(pixels.flags.owndata for pixels in image.channels.values())
-
-
-def test_attributes_come_back(tmp_path):
-    path = tmp_path / "a.exr"
-    facet_from_world = np.arange(12).reshape(3, 4) / 7
-    write_exr(path, noise(), provenance() | exr.facet_attributes(17, facet_from_world))
-    found = read_header(path).attributes
-    assert found["quilt:frame"] == -7
-    for name in ("eye", "look", "up"):
-        assert found[f"quilt:{name}"].dtype == np.float32
-        np.testing.assert_array_equal(getattr(VIEWER, name).astype(np.float32), found[f"quilt:{name}"])
-    assert np.float32(0.05) == np.float32(found["quilt:near"])
-    assert found["quilt:far"] == 50.0
-    assert found["quilt:depth"] == "planar"
-    assert found["quilt:job"] == "ab" * 32
-    assert found["quilt:version"] == "0.1.0"
-    assert found["framesPerSecond"] == Fraction(30000, 1001)
-    assert found["quilt:facet"] == 17
-    numbers = [float(word) for word in found["quilt:facet_from_world"].split()]
-    np.testing.assert_array_equal(facet_from_world.ravel(), numbers)
-
-
-def test_the_eye_is_a_v3f(tmp_path):
-    path = tmp_path / "a.exr"
-    write_exr(path, noise(), provenance())
-    assert b"quilt:eye\0v3f\0" in path.read_bytes()
 
 
 def test_attributes_read_can_be_written_again(tmp_path):
@@ -435,43 +379,6 @@ def test_many_parts(tmp_path, tiled):
     for size in range(40, len(whole), 211):
         path.write_bytes(whole[:size])
         assert exr.exr_fault(path).startswith("is truncated: "), size
-
-
-# --- names and resuming ---
-
-
-@pytest.mark.parametrize(
-    ("frame", "expected"),
-    [(1, "0001"), (0, "0000"), (12345, "12345"), (-1, "-0001"), (-12345, "-12345")],
-)
-def test_the_frame_ends_the_name(tmp_path, frame, expected):
-    assert tmp_path / "quilt" / f"page_01.{expected}.exr" == quilt_path(tmp_path, 1, frame)
-    assert tmp_path / "facets" / f"facet_0012.{expected}.exr" == facet_path(tmp_path, 12, frame)
-    assert exr.numbers_in_name(quilt_path(tmp_path, 123, frame)) == ("page", 123, frame)
-    assert exr.numbers_in_name(facet_path(tmp_path, 12345, frame)) == ("facet", 12345, frame)
-
-
-@pytest.mark.parametrize(
-    "name", ["page_01.exr", "page_01.001.exr", "page.0001.exr", ".page_01.0001.exr.9.tmp"]
-)
-def test_other_names_hold_no_numbers(tmp_path, name):
-    assert exr.numbers_in_name(tmp_path / name) is None
-
-
-def test_complete_means_whole_and_of_this_job(tmp_path):
-    path, sha = tmp_path / "a.exr", "ab" * 32
-    assert not is_complete(path, sha, -7)
-    write_exr(path, noise(), provenance())
-    assert is_complete(path, sha, -7)
-    assert not is_complete(path, "cd" * 32, -7)
-    assert not is_complete(path, sha, 7)
-    os.truncate(path, path.stat().st_size - 1)
-    assert not is_complete(path, sha, -7)
-
-
-def test_an_image_of_another_program_is_never_complete(tmp_path):
-    write_exr(tmp_path / "a.exr", noise(), {})
-    assert not is_complete(tmp_path / "a.exr", "", 0)
 
 
 def test_records_are_frozen(tmp_path):

@@ -13,8 +13,8 @@ from quiltcli.analysis.verify.images import Images, draw_images
 from quiltcli.analysis.verify.pixels import Trial
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.job import JobFile, load_job
-from quiltcli.render.sequence import viewer_path
 from quiltcli.render.setup import Stage, set_stage
+from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 from tests.helpers.in_memory import CUBE, CUBE_FACES, icosphere
 
@@ -106,7 +106,7 @@ class Shot:
 
 def shoot(job: JobFile) -> Shot:
     stage = set_stage(job)
-    viewer = viewer_path(job, list(job.frames))[0]
+    viewer = viewers_of(job, list(job.frames))[0]
     return Shot(stage, viewer, draw_images(stage, viewer, threads=1))
 
 

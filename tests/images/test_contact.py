@@ -9,8 +9,9 @@ import quiltcli.images.contact as module
 from quiltcli.cli import main
 from quiltcli.errors import OutputError
 from quiltcli.formats.drawing.font import text_mask
-from quiltcli.formats.exr.image import facet_path, quilt_path, write_exr
+from quiltcli.formats.exr.image import write_exr
 from quiltcli.images.contact import Sheet, chosen_images, contact_sheet
+from quiltcli.images.names import facet_path, quilt_path
 from quiltcli.images.preview import Look
 
 PLAIN = Look("raw")

@@ -6,10 +6,11 @@ import pytest
 
 from quiltcli.errors import OutputError
 from quiltcli.formats.exr import image as exr
-from quiltcli.formats.exr.image import facet_path, quilt_path, read_exr, write_exr
+from quiltcli.formats.exr.image import read_exr, write_exr
 from quiltcli.geometry import facet_from_world
 from quiltcli.images import facets as unmap
 from quiltcli.images.facets import facet_image, quilt_buffers
+from quiltcli.images.names import facet_path, quilt_path
 from quiltcli.images.unmap import unmap as unmap_files
 from quiltcli.layout import Layout, pixel_owners
 

@@ -13,6 +13,7 @@ from quiltcli.errors import CheckFailedError, JobError
 from quiltcli.job import job_sha256, load_job
 from quiltcli.render.farm import Task, render_on, render_task
 from quiltcli.render.sequence import Listener, RenderOptions, render
+from quiltcli.viewer.view import views_at
 from tests.helpers.tiny_job import IMAGES, SETTINGS, files_in, replaced, write_tiny_job
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
@@ -33,7 +34,8 @@ def address() -> Iterator[str]:
 
 
 def task(job_file: Path, frame: int, options: RenderOptions) -> Task:
-    return Task(job_file, job_sha256(load_job(job_file)), frame, options)
+    job = load_job(job_file)
+    return Task(job_file, job_sha256(job), views_at(job, frame)[0], options)
 
 
 def test_what_is_missing_is_named(tiny: Path, monkeypatch: pytest.MonkeyPatch) -> None:

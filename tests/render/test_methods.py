@@ -23,7 +23,7 @@ from quiltcli.render.methods import draw_frame
 from quiltcli.render.methods.twopass import picture_size
 from quiltcli.render.sequence import RenderOptions, render
 from quiltcli.render.setup import set_stage
-from quiltcli.viewer.viewer import viewer_at
+from quiltcli.viewer.view import viewers_of
 from quiltcli.visibility.draw import batches, rasterize
 from quiltcli.visibility.scan.depth_buffers import (
     LEAST_FACTOR,
@@ -261,7 +261,7 @@ def plates(tmp_path_factory: pytest.TempPathFactory):
         f"output: {{channels: [{', '.join(ALL)}]}}\n"
     )
     job = load_job(folder / "job.yaml")
-    return set_stage(job), viewer_at(job.viewer, 1)
+    return set_stage(job), viewers_of(job, [1])[0]
 
 
 def by(stage, viewer, method: str, bits: str | None = None, **more):
@@ -308,7 +308,7 @@ def test_rays_take_the_lowest_of_triangles_at_one_depth(tmp_path: Path) -> None:
     )
     job = write_tiny_job(tmp_path)
     job = load_job(job, (f"scene={tmp_path / 'coats.obj'}", "output.channels=[Z, triangle]"))
-    stage, viewer = set_stage(job), viewer_at(job.viewer, 2)
+    stage, viewer = set_stage(job), viewers_of(job, [2])[0]
     cast, exact = (by(stage, viewer, method)[0] for method in ("raycast", "homography"))
     assert set(np.unique(exact["triangle"])) == {0, 1, 2}
     assert (cast["triangle"] == exact["triangle"]).all()
@@ -368,7 +368,7 @@ def test_two_passes_repeat_the_picture_where_its_pixels_are_the_facets(tmp_path:
         f"render: {{bleed: 0}}\noutput: {{channels: [{', '.join(ALL)}]}}\n"
     )
     job = load_job(tmp_path / "job.yaml")
-    stage, viewer = set_stage(job), viewer_at(job.viewer, 1)
+    stage, viewer = set_stage(job), viewers_of(job, [1])[0]
     assert picture_size(stage, viewer, np.ones(1, bool))[0] == (64, 64)
     once, twice = by(stage, viewer, "homography")[0], by(stage, viewer, "twopass")[0]
     assert np.isfinite(once["Z"]).any()

@@ -11,7 +11,7 @@ from quiltcli.geometry import normalized
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.shading.adaptive import NodeShader, pixel_colors
-from quiltcli.shading.aovs import CHANNELS, half_floats
+from quiltcli.shading.aovs import SOURCES, half_floats
 from quiltcli.shading.nodes import Nodes
 from quiltcli.shading.shade import LEAST_DISTANCE, shade
 from quiltcli.visibility.resolve.reader import TileRays
@@ -159,7 +159,7 @@ def test_colours_between_nodes_are_rounded_like_others(color):
     some = tiles(np.random.default_rng(10), lamp, bent=True, near_glint=False)
     some = some[NodeShader(scene, EYE).calm(some)]
     seen = some.hits(NodeShader(scene, EYE).colors(some))
-    halves = CHANNELS["rgba"].values(scene, None, seen)[:3]
+    halves = SOURCES["rgba"].values(scene, None, seen)[:3]
     exact = shade(scene, EYE, seen.points)
     for found, values, each in zip(halves, pixel_colors(scene, EYE, seen), exact, strict=True):
         np.testing.assert_array_equal(found, half_floats(values))

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quiltcli.job.job import CHANNELS as KNOWN_TO_JOBS
-from quiltcli.shading.aovs import CHANNELS, canonical_depth, empty_buffers, exr_channels, fill
+from quiltcli.channels import CHANNELS, empty_buffers, exr_channels
+from quiltcli.shading.aovs import SOURCES, canonical_depth, fill
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.resolve.hits import single_places
 from tests.helpers.wall_scene import EYE, STRAIGHT, hits, lights, wall
@@ -23,8 +23,8 @@ def filled(name, viewer=VIEWER, seen=STRAIGHT, scene=SCENE, pixels=2):
     return buffers
 
 
-def test_jobs_may_ask_for_every_channel_and_no_other():
-    assert tuple(CHANNELS) == KNOWN_TO_JOBS
+def test_every_channel_of_the_schema_is_computed_and_no_other():
+    assert tuple(CHANNELS) == tuple(SOURCES)
 
 
 def test_default_channels_have_the_types_everyone_expects():

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,17 @@ from hypothesis import strategies as st
 
 from quiltcli.errors import QuiltError
 from quiltcli.job import PathSpec, ViewerSpec
+from quiltcli.viewer import viewer as viewers
 from quiltcli.viewer.paths import smooth
-from quiltcli.viewer.viewer import check_viewer, viewer_at
+from quiltcli.viewer.view import view_problems
+
+
+def viewer_at(viewer, frame, depth="planar"):
+    return viewers.viewer_at(viewer, frame, depth)
+
+
+def check_viewer(viewer, frames):
+    return view_problems(SimpleNamespace(viewer=viewer, render=SimpleNamespace(depth="planar")), frames)
 
 
 def spec(**path: Any) -> ViewerSpec:

@@ -11,7 +11,8 @@ import pytest
 from quiltcli.display import lit_facets
 from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.buffers import new_buffers
-from quiltcli.render.frame import draw_frame, plan_of
+from quiltcli.render.crew import plan_of
+from quiltcli.render.frame import draw_frame
 from quiltcli.visibility.draw import pairs_by_block
 from quiltcli.visibility.setup.prewarp import triangles_of
 from quiltcli.visibility.shares import (

@@ -11,11 +11,11 @@ import numpy as np
 
 from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, number, vector
 from quiltcli.display import Facets, lit_facets, load_display
-from quiltcli.errors import ViewerError, raise_all
 from quiltcli.job import job_sha256, load_display_file, load_job
 from quiltcli.job.dump import plain
 from quiltcli.job.frames import format_frames
-from quiltcli.viewer.viewer import Viewer, check_viewer, viewer_at
+from quiltcli.viewer.view import viewers_of
+from quiltcli.viewer.viewer import Viewer
 
 
 def job_info(path: Path) -> Info:
@@ -25,8 +25,7 @@ def job_info(path: Path) -> Info:
         JobError, ViewerError, MeshError, DisplayError: the job, its path or its display is wrong.
     """
     job = load_job(path)
-    raise_all(ViewerError, check_viewer(job.viewer, job.frames))
-    viewers = [viewer_at(job.viewer, frame, job.render.depth) for frame in job.frames]
+    viewers = viewers_of(job, job.frames)
     table = _frame_table(viewers, load_display(load_display_file(job.display)))
     eyes = np.stack([viewer.eye for viewer in viewers])
     length = float(sum(np.linalg.norm(b - a) for a, b in pairwise(eyes)))

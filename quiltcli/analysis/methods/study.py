@@ -37,11 +37,11 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
 from quiltcli.images.preview import Bytes
 from quiltcli.job import JobFile
 from quiltcli.render.buffers import Buffers, new_buffers
-from quiltcli.render.frame import default_threads
+from quiltcli.render.crew import default_threads
 from quiltcli.render.methods import draw_frame
-from quiltcli.render.sequence import viewer_path
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.edge_on import eye_problems
+from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 
 _CHANNELS = ("rgba", "Z", "triangle")
@@ -121,7 +121,7 @@ def compare(job: JobFile, options: CompareOptions | None = None) -> Study:
     """
     options = options or CompareOptions()
     frame = job.frames[0] if options.frame is None else options.frame
-    viewers = viewer_path(job, [frame])
+    viewers = viewers_of(job, [frame])
     stage = set_stage(with_variant(job, REFERENCE))
     raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
     variants = (REFERENCE, *(v for v in dict.fromkeys(options.variants) if v != REFERENCE))

@@ -25,14 +25,14 @@ from quiltcli.analysis.simulate.picture import (
 from quiltcli.analysis.simulate.reference import resampled_light
 from quiltcli.analysis.simulate.thirdperson import third_person_camera, third_person_light
 from quiltcli.display import Facets
-from quiltcli.errors import ViewerError, raise_all
 from quiltcli.geometry import Float32Array
 from quiltcli.images.preview import block_means
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.projection.camera import aimed, camera_display, frame_display
-from quiltcli.render.frame import default_threads
+from quiltcli.render.crew import default_threads
 from quiltcli.render.setup import Stage, set_stage
-from quiltcli.viewer.viewer import Viewer, check_viewer, viewer_at
+from quiltcli.viewer.view import views_of
+from quiltcli.viewer.viewer import Viewer
 
 __all__ = [
     "Comparison",
@@ -109,13 +109,13 @@ def simulate(
         QuiltError: bad input, or images that cannot be read.
     """
     options = options or PictureOptions()
-    raise_all(ViewerError, check_viewer(job.viewer, frames))
+    views = views_of(job, frames)
     sha = job_sha256(job)
     stage = set_stage(with_channels(job, ("rgba",)))
     threads = options.threads or default_threads()
-    for frame in frames:
-        viewer = viewer_at(job.viewer, frame, job.render.depth)
-        shown, source = shown_images(stage, viewer, job.output.directory, sha, threads)
+    for view in views:
+        viewer = view.viewer
+        shown, source = shown_images(stage, view, job.output.directory, sha, threads)
         yield replace(take_picture(stage, viewer, shown, options), source=source)
 
 

@@ -8,23 +8,25 @@ import numpy as np
 
 from quiltcli.analysis.simulate.lookup import Shown
 from quiltcli.display import lit_facets
-from quiltcli.formats.exr.image import facet_path, is_complete, quilt_path, read_exr
+from quiltcli.formats.exr.image import read_exr
 from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.images.facets import page_of, quilt_buffers
+from quiltcli.images.metadata import is_complete
+from quiltcli.images.names import facet_path, quilt_path
 from quiltcli.images.window import whole_frame
 from quiltcli.layout import pixel_owners
 from quiltcli.render.buffers import Buffers, new_buffers
-from quiltcli.render.methods import draw_frame
+from quiltcli.render.methods import draw_view
 from quiltcli.render.setup import Stage
-from quiltcli.viewer.viewer import Viewer
+from quiltcli.viewer.view import View
 
 
-def shown_images(stage: Stage, viewer: Viewer, folder: Path, job_sha: str, threads: int) -> tuple[Shown, str]:
+def shown_images(stage: Stage, view: View, folder: Path, job_sha: str, threads: int) -> tuple[Shown, str]:
     """The images of one frame.
 
     Args:
         stage: display, layout and scene; its job's channels hold `rgba`.
-        viewer: the frame's viewer.
+        view: the view.
         folder: where a render of the job leaves its files.
         job_sha: hash a file must have to be taken for this job's.
         threads: batches drawn at a time.
@@ -32,24 +34,25 @@ def shown_images(stage: Stage, viewer: Viewer, folder: Path, job_sha: str, threa
     Returns:
         The images, and where they came from in words.
     """
+    viewer = view.viewer
     lit = lit_facets(stage.facets, viewer.eye) & (stage.layout.page >= 0)
     buffers: Buffers | None = None
     owners: OwnerArray = stage.owners
-    if (buffers := _quilts(stage, viewer.frame, folder, job_sha)) is not None:
+    if (buffers := _quilts(stage, view, folder, job_sha)) is not None:
         source = f"read from {folder / 'quilt'}"
-    elif (buffers := _facets(stage, lit, viewer.frame, folder, job_sha)) is not None:
+    elif (buffers := _facets(stage, lit, view, folder, job_sha)) is not None:
         source = f"read from {folder / 'facets'}"
         owners = pixel_owners(stage.layout)  # a facet's image ends at its polygon
     else:
         buffers, source = new_buffers(stage), "drawn for this picture"
-        draw_frame(stage, viewer, buffers, threads)
+        draw_view(stage, view, buffers, threads)
     return Shown(stage.facets, stage.layout, lit, buffers, owners, viewer.eye), source
 
 
-def _quilts(stage: Stage, frame: int, folder: Path, job_sha: str) -> Buffers | None:
+def _quilts(stage: Stage, view: View, folder: Path, job_sha: str) -> Buffers | None:
     """The quilt on disk, None where a page is missing or not this job's."""
-    paths = [quilt_path(folder, page + 1, frame) for page in range(len(stage.layout.pages))]
-    if not all(is_complete(path, job_sha, frame) for path in paths):
+    paths = [quilt_path(folder, page + 1, *view.key) for page in range(len(stage.layout.pages))]
+    if not all(is_complete(path, job_sha, view.frame) for path in paths):
         return None
     buffers = {name: np.zeros(stage.owners.size, dtype=np.float16) for name in "RGB"}
     for page, path in enumerate(paths):
@@ -61,11 +64,11 @@ def _quilts(stage: Stage, frame: int, folder: Path, job_sha: str) -> Buffers | N
     return buffers
 
 
-def _facets(stage: Stage, lit: BoolArray, frame: int, folder: Path, job_sha: str) -> Buffers | None:
+def _facets(stage: Stage, lit: BoolArray, view: View, folder: Path, job_sha: str) -> Buffers | None:
     """The quilt put together from the lit facets' images on disk, None where one is missing."""
     rows = np.flatnonzero(lit).tolist()
-    paths = {row: facet_path(folder, int(stage.layout.facet[row]), frame) for row in rows}
-    if not paths or not all(is_complete(path, job_sha, frame) for path in paths.values()):
+    paths = {row: facet_path(folder, int(stage.layout.facet[row]), *view.key) for row in rows}
+    if not paths or not all(is_complete(path, job_sha, view.frame) for path in paths.values()):
         return None
     images = {}
     for row, path in paths.items():

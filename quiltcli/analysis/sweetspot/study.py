@@ -27,7 +27,7 @@ from quiltcli.display import Facets, load_display
 from quiltcli.errors import JobError, Problem
 from quiltcli.geometry import FloatArray
 from quiltcli.job import load_display_file, load_job
-from quiltcli.viewer.viewer import viewer_at
+from quiltcli.viewer.view import views_at
 
 _SEARCH_SAMPLES = 400
 _ROOM = 3  # times as far as one may go, on a map of the default size
@@ -130,7 +130,7 @@ def ask(
     place = None if eye is None else np.array(eye, dtype=np.float64)
     if job is not None:
         spec = load_job(job)
-        place = viewer_at(spec.viewer, spec.frames[0] if frame is None else frame).eye
+        place = views_at(spec, spec.frames[0] if frame is None else frame)[0].viewer.eye
     return load_display(load_display_file(display)), Question(place, content, **how)
 
 

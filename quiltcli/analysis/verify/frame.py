@@ -22,10 +22,10 @@ from quiltcli.errors import ViewerError, raise_all
 from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.job import JobFile
 from quiltcli.projection.planar import quilt_rays
-from quiltcli.render.frame import default_threads
-from quiltcli.render.sequence import viewer_path
+from quiltcli.render.crew import default_threads
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.edge_on import eye_problems
+from quiltcli.viewer.view import views_of
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import aim
 from quiltcli.visibility.rays.exact import Neighbours
@@ -125,13 +125,13 @@ def verify(job: JobFile, options: VerifyOptions | None = None) -> tuple[Verdict,
     """
     options = options or VerifyOptions()
     frame = job.frames[0] if options.frame is None else options.frame
-    viewers = viewer_path(job, [frame])
+    [view] = views_of(job, [frame])
     stage = set_stage(job)
-    raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
+    raise_all(ViewerError, eye_problems(stage.facets, view.viewers, job.viewer.source))
     threads = options.threads or default_threads()
     folder = options.folder or job.output.directory
-    images = find_images(stage, viewers[0], folder, threads, options.redraw)
-    return verify_images(stage, viewers[0], images, options), stage, images
+    images = find_images(stage, view, folder, threads, options.redraw)
+    return verify_images(stage, view.viewer, images, options), stage, images
 
 
 def verify_images(stage: Stage, viewer: Viewer, images: Images, options: VerifyOptions) -> Verdict:

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from quiltcli.formats.exr.image import is_complete, quilt_path
+from quiltcli.channels import empty_buffers
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
+from quiltcli.images.metadata import is_complete
+from quiltcli.images.names import quilt_path
 from quiltcli.job import job_sha256
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.methods import draw_frame
 from quiltcli.render.outputs import outputs, read_quilt
 from quiltcli.render.setup import Stage
-from quiltcli.shading.aovs import empty_buffers
+from quiltcli.viewer.view import View
 from quiltcli.viewer.viewer import Viewer
 
 _DRAWN = ("Z", "triangle")
@@ -48,7 +50,7 @@ class Images:
         return self.channels["A"][address] > 0 if "A" in self.channels else None
 
 
-def find_images(stage: Stage, viewer: Viewer, folder: Path, threads: int, redraw: bool) -> Images:
+def find_images(stage: Stage, view: View, folder: Path, threads: int, redraw: bool) -> Images:
     """The quilt in `folder` if it is whole and made by this job, else one drawn in memory.
 
     Raises:
@@ -56,7 +58,8 @@ def find_images(stage: Stage, viewer: Viewer, folder: Path, threads: int, redraw
     """
     channels = stage.job.output.channels
     out = outputs(stage, folder, job_sha256(stage.job))
-    pages = [quilt_path(folder, page + 1, viewer.frame) for page in range(len(stage.layout.pages))]
+    viewer = view.viewer
+    pages = [quilt_path(folder, page + 1, *view.key) for page in range(len(stage.layout.pages))]
     if redraw:
         return draw_images(stage, viewer, threads)
     if not all(is_complete(path, out.job_sha, viewer.frame) for path in pages):
@@ -69,7 +72,7 @@ def find_images(stage: Stage, viewer: Viewer, folder: Path, threads: int, redraw
     buffers = empty_buffers(wanted, stage.owners.size)
     for unused in "RGB":
         buffers.pop(unused, None)
-    read_quilt(stage, out, viewer.frame, buffers)
+    read_quilt(stage, out, view, buffers)
     return Images(f"the quilt in {folder}", buffers)
 
 

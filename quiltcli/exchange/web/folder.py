@@ -11,11 +11,13 @@ import numpy as np
 from quiltcli.analysis.simulate.picture import with_channels
 from quiltcli.display import lit_facets
 from quiltcli.errors import OutputError, Problem
-from quiltcli.formats.exr.image import facet_path, is_complete, numbers_in_name, quilt_path, read_header
+from quiltcli.formats.exr.image import read_header
+from quiltcli.images.metadata import is_complete
+from quiltcli.images.names import facet_path, name_of, quilt_path
 from quiltcli.job import load_job
 from quiltcli.job.frames import format_frames
 from quiltcli.render.setup import Stage, set_stage
-from quiltcli.viewer.viewer import viewer_at
+from quiltcli.viewer.view import views_at
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ def open_folder(path: Path) -> Folder:
     used = path / "layout.yaml"
     known = job.model_copy(update={"layout": used}) if used.is_file() else job
     stage = set_stage(with_channels(known, ("rgba",)))
-    frames = tuple(sorted({found[2] for found in map(numbers_in_name, _images(path)) if found}))
+    frames = tuple(sorted({found.frame for found in map(name_of, _images(path)) if found}))
     if not frames:
         raise OutputError(Problem("has no images of frames (run quilt render first)", file=str(path)))
     return Folder(path, stage, frames)
@@ -88,7 +90,7 @@ def images_sha(folder: Folder, frame: int) -> str:
     """
     layout = folder.stage.layout
     pages = [quilt_path(folder.path, page + 1, frame) for page in range(len(layout.pages))]
-    eye = viewer_at(folder.stage.job.viewer, frame).eye
+    eye = views_at(folder.stage.job, frame)[0].viewer.eye
     lit = lit_facets(folder.stage.facets, eye) & (layout.page >= 0)  # a render may leave the others out
     facets = [facet_path(folder.path, facet, frame) for facet in layout.facet[lit].tolist()]
     found = [paths for paths in (pages, facets) if paths and paths[0].is_file()]
@@ -106,7 +108,7 @@ def images_sha(folder: Folder, frame: int) -> str:
 
 
 def _check_eye(folder: Folder, frame: int, attributes: Mapping[str, object], path: Path) -> None:
-    eye = viewer_at(folder.stage.job.viewer, frame).eye
+    eye = views_at(folder.stage.job, frame)[0].viewer.eye
     drawn = np.asarray(attributes.get("quilt:eye", np.full(3, np.nan)), dtype=np.float64)
     if not np.abs(eye - drawn).max() <= 1e-6 * max(1.0, float(np.abs(eye).max())):
         wrong = f"was drawn for another eye than that of {folder.path / 'job.yaml'} (render it again)"

@@ -14,8 +14,9 @@ from quiltcli.exchange.web.folder import Folder, images_sha
 from quiltcli.exchange.web.textures import Picture, picture
 from quiltcli.geometry import BoolArray, FloatArray
 from quiltcli.projection.camera import frame_display
-from quiltcli.render.frame import default_threads
-from quiltcli.viewer.viewer import Viewer, viewer_at
+from quiltcli.render.crew import default_threads
+from quiltcli.viewer.view import views_at
+from quiltcli.viewer.viewer import Viewer
 
 ASPECT = 4 / 3
 """Width over height of the view from the eye, for which its angle is chosen."""
@@ -70,15 +71,15 @@ class FrameView:
 def frame_images(folder: Folder, frame: int) -> Shown:
     """The images of a frame."""
     stage = folder.stage
-    viewer = viewer_at(stage.job.viewer, frame, stage.job.render.depth)
+    view = views_at(stage.job, frame)[0]
     sha = images_sha(folder, frame)
-    return shown_images(stage, viewer, folder.path, sha, default_threads())[0]
+    return shown_images(stage, view, folder.path, sha, default_threads())[0]
 
 
 def frame_view(folder: Folder, frame: int, errors: bool) -> FrameView:
     """What is seen in a frame, and how far off it is where `errors` are asked for."""
     stage = folder.stage
-    viewer = viewer_at(stage.job.viewer, frame, stage.job.render.depth)
+    viewer = views_at(stage.job, frame)[0].viewer
     camera, fov = frame_display(viewer, stage.facets.corners, ASPECT, turn=True)
     lit = lit_facets(stage.facets, viewer.eye) & (stage.layout.page >= 0)
     found = FrameView(viewer, camera, fov, lit, None, ())
@@ -100,4 +101,4 @@ def eye_path(folder: Folder, most: int = 2000) -> FloatArray:
     """Places (n, 3) of the eye over the job's frames, at most `most` of them, evenly apart."""
     frames = folder.stage.job.frames
     chosen = frames[:: -(-len(frames) // most)]
-    return np.stack([viewer_at(folder.stage.job.viewer, frame).eye for frame in chosen])
+    return np.stack([views_at(folder.stage.job, frame)[0].viewer.eye for frame in chosen])

@@ -1,11 +1,10 @@
-"""OpenEXR images: written whole, read strictly, with the provenance every file carries.
+"""OpenEXR images: written whole, read strictly.
 
 One image is one part of planar channels, each (H, W) of float16, float32 or uint32.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,8 +18,6 @@ from numpy.typing import NDArray
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.exr.check import exr_fault
 from quiltcli.formats.whole import whole_file, write_problem
-from quiltcli.geometry import FloatArray
-from quiltcli.viewer.viewer import Viewer
 
 Channel: TypeAlias = NDArray[Any]
 Window: TypeAlias = tuple[tuple[int, int], tuple[int, int]]
@@ -38,7 +35,6 @@ _STRUCTURE = _WINDOWS | {
     "type",
     "version",
 }
-_NAME = re.compile(r"(?P<kind>[A-Za-z]+)_(?P<number>\d+)\.(?P<frame>-?\d{4,})\.exr")
 
 
 @dataclass(frozen=True)
@@ -216,58 +212,3 @@ def _image(header: Mapping[str, Any], channels: Mapping[str, Any]) -> Image:
 def _window(corners: Any) -> Window:
     (x0, y0), (x1, y1) = corners
     return (int(x0), int(y0)), (int(x1), int(y1))
-
-
-def is_complete(path: Path, job_sha: str, frame: int) -> bool:
-    """Whether `path` is a whole image of this `frame` made by the job with that hash.
-
-    The structure of the file is checked to its last byte; no pixel is decoded.
-    """
-    try:
-        attributes = read_header(path).attributes
-    except OutputError:
-        return False
-    return attributes.get("quilt:job") == job_sha and attributes.get("quilt:frame") == frame
-
-
-def frame_attributes(viewer: Viewer, fps: Fraction, job_sha: str, version: str) -> dict[str, object]:
-    """Attributes of every file of a frame: when, from where, by which job and program."""
-    return {
-        "framesPerSecond": Fraction(fps),
-        "quilt:frame": int(viewer.frame),
-        "quilt:eye": np.asarray(viewer.eye, dtype=np.float32),
-        "quilt:look": np.asarray(viewer.look, dtype=np.float32),
-        "quilt:up": np.asarray(viewer.up, dtype=np.float32),
-        "quilt:near": float(viewer.near),
-        "quilt:far": float(viewer.far),
-        "quilt:depth": viewer.depth,
-        "quilt:job": job_sha,
-        "quilt:version": version,
-    }
-
-
-def facet_attributes(facet_id: int, facet_from_world: FloatArray) -> dict[str, object]:
-    """What a facet image adds: its 1-based id and its (3, 4) map, written so that it reads back exactly."""
-    numbers = " ".join(repr(float(number)) for number in np.asarray(facet_from_world).reshape(12))
-    return {"quilt:facet": int(facet_id), "quilt:facet_from_world": numbers}
-
-
-def frame_digits(frame: int) -> str:
-    """A frame number as it ends a file name: a sign if negative, then four digits or more."""
-    return f"{'-' if frame < 0 else ''}{abs(frame):04d}"
-
-
-def quilt_path(out: Path, page: int, frame: int) -> Path:
-    """The file of a quilt's page (1-based) in a frame."""
-    return Path(out) / "quilt" / f"page_{page:02d}.{frame_digits(frame)}.exr"
-
-
-def facet_path(out: Path, facet_id: int, frame: int) -> Path:
-    """The file of a facet's image (1-based id) in a frame."""
-    return Path(out) / "facets" / f"facet_{facet_id:04d}.{frame_digits(frame)}.exr"
-
-
-def numbers_in_name(path: Path) -> tuple[str, int, int] | None:
-    """Kind (`page`, `facet`), number and frame of a file named like the above; None of any other."""
-    match = _NAME.fullmatch(path.name)
-    return (match["kind"], int(match["number"]), int(match["frame"])) if match else None

@@ -6,19 +6,23 @@ rasterizer; the others have a module each. All share scene, shading, channels an
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
 
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers
-from quiltcli.render.frame import Crew
+from quiltcli.render.crew import Crew
 from quiltcli.render.frame import draw_frame as rasterize_frame
 from quiltcli.render.methods.raycast import cast_frame
 from quiltcli.render.methods.twopass import draw_twice
-from quiltcli.render.report import FrameRecord
+from quiltcli.render.report import FrameRecord, together
 from quiltcli.render.setup import Stage
+from quiltcli.viewer.view import View
 from quiltcli.viewer.viewer import Viewer
 
-__all__ = ["OTHERS", "draw_frame"]
+__all__ = ["OTHERS", "draw_frame", "draw_view"]
 
 OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], FrameRecord]] = {
     "twopass": draw_twice,
@@ -42,3 +46,33 @@ def draw_frame(
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
     return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, crew=crew)
+
+
+def draw_view(
+    stage: Stage,
+    view: View,
+    buffers: Buffers,
+    threads: int = 1,
+    only: BoolArray | None = None,
+    *,
+    dirty: BoolArray | None = None,
+    crew: Crew | None = None,
+) -> FrameRecord:
+    """Draw a view: what each of its viewers sees on facets of their own. Arguments as for `draw_frame`."""
+    records = [
+        draw_frame(stage, viewer, buffers, threads, theirs, dirty=dirty, crew=crew)
+        for viewer, theirs in facets_by_viewer(view, stage.facets.count, only)
+    ]
+    return replace(together(records), eye=view.eye)
+
+
+def facets_by_viewer(
+    view: View, count: int, only: BoolArray | None
+) -> Iterator[tuple[Viewer, BoolArray | None]]:
+    """Each viewer of a view with the facets (F,) to be drawn for them, None for all."""
+    for viewer in view.viewers:
+        theirs = only
+        if viewer.facets is not None:
+            theirs = np.isin(np.arange(1, count + 1), viewer.facets)
+            theirs &= True if only is None else only
+        yield viewer, theirs

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.channels import CHANNELS
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.projection.camera import camera_display, viewer_frustum
@@ -24,7 +25,6 @@ from quiltcli.render.frame import draw_frame
 from quiltcli.render.methods.raycast import pixels_of
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage, stage_of
-from quiltcli.shading.aovs import CHANNELS
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.pixels import places
 

@@ -1,0 +1,69 @@
+"""Channels: their names, EXR layers, pixel types and empty values. No code that computes is here.
+
+To add a channel, add a row to `CHANNELS`, and the function that computes it to `shading.aovs`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Pixels: TypeAlias = NDArray[Any]
+
+MOST_HALF = np.float32(65504)
+"""The largest finite half float; brighter values are written as this."""
+
+_HALF, _FLOAT, _UINT = np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.uint32)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One job channel.
+
+    Attributes:
+        layers: names of its EXR channels.
+        dtype: their pixel type.
+        empty: value of a pixel that sees nothing.
+    """
+
+    layers: tuple[str, ...]
+    dtype: np.dtype[Any]
+    empty: float = 0.0
+
+
+# A pixel that sees nothing is infinitely far in `zv` as well as in `Z`, so that it cannot be taken for
+# one on the far plane, where zv is 1.
+CHANNELS: Mapping[str, Channel] = MappingProxyType(
+    {
+        "rgba": Channel(("R", "G", "B", "A"), _HALF),
+        "Z": Channel(("Z",), _FLOAT, np.inf),
+        "zv": Channel(("zv",), _FLOAT, np.inf),
+        "facet": Channel(("facet",), _UINT),
+        "object": Channel(("object",), _UINT),
+        "triangle": Channel(("triangle",), _UINT),
+        "N": Channel(("N.X", "N.Y", "N.Z"), _HALF),
+        "P": Channel(("P.X", "P.Y", "P.Z"), _FLOAT),
+    }
+)
+
+
+def exr_channels(names: Iterable[str]) -> dict[str, tuple[np.dtype[Any], float]]:
+    """Pixel type and empty value of every EXR channel that the job channels `names` bring, in order."""
+    rows = [CHANNELS[name] for name in names]
+    return {layer: (row.dtype, row.empty) for row in rows for layer in row.layers}
+
+
+def empty_buffers(names: Iterable[str], pixels: int) -> dict[str, Pixels]:
+    """A flat buffer (pixels,) for every EXR channel, in which nothing is seen yet."""
+    return {layer: np.full(pixels, empty, dtype) for layer, (dtype, empty) in exr_channels(names).items()}
+
+
+BACKGROUND: Mapping[str, float] = MappingProxyType(
+    {layer: empty for layer, (_, empty) in exr_channels(CHANNELS).items()}
+)
+"""What pixels of no facet hold, by EXR channel; 0 in channels that are not named."""
