@@ -1,7 +1,8 @@
 """The command line: parse, call one library function a command, print.
 
 Nothing heavy is imported before a command runs, so `quilt --help` answers at once. Results go to
-stdout, everything else to stderr. A module of commands adds them to `group.main` by being imported.
+stdout, everything else to stderr. A command is a function in a file of its own name, which `group`
+lists and imports when the command is wanted.
 """
 
 from __future__ import annotations
@@ -10,10 +11,9 @@ import os
 import sys
 from pathlib import Path
 
-from quiltcli.cli import files, layouts, looking, rendering
 from quiltcli.cli.group import main
 
-__all__ = ["files", "layouts", "looking", "main", "rendering", "run"]
+__all__ = ["main", "run"]
 
 
 def run() -> None:

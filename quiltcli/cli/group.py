@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import click
@@ -9,9 +10,23 @@ import click
 from quiltcli import __version__
 from quiltcli.errors import QuiltError
 
+COMMANDS = (
+    *("check", "compare", "contact", "diff", "export", "import", "info", "pack", "pattern", "preview"),
+    *("render", "simulate", "sweetspot", "unmap", "verify", "view"),
+)
+
 
 class Quilt(click.Group):
-    """The `quilt` command."""
+    """The `quilt` command; a command's module is imported when the command is wanted."""
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """A command: the function of the name of its module."""
+        if cmd_name not in self.commands:
+            return None
+        name = "import_" if cmd_name == "import" else cmd_name  # the word is Python's
+        command = getattr(import_module(f"quiltcli.cli.{name}"), name)
+        assert isinstance(command, click.Command)
+        return command
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; errors that are the user's to mend become one line a problem."""
@@ -45,7 +60,9 @@ def _unexpected(error: Exception) -> str:
 
 
 @click.group(
-    cls=Quilt, context_settings={"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "QUILT"}
+    cls=Quilt,
+    commands={name: click.Command(name) for name in COMMANDS},  # names alone, until one is wanted
+    context_settings={"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "QUILT"},
 )
 @click.version_option(__version__, prog_name="quilt")
 @click.option("--debug", is_flag=True, help="Show tracebacks.")

@@ -1,4 +1,4 @@
-"""Values of options that the library reads from text."""
+"""Options that several commands have, and values that the library reads from text."""
 
 from __future__ import annotations
 
@@ -90,3 +90,9 @@ POINT = Parsed("point", _point)
 AREA = Parsed("area", _area)
 VIEW = click.Choice(("aces", "srgb"))
 STILL_VIEW = click.Choice(("aces", "srgb", "raw"))
+THREADS = click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
+SETS = click.option(
+    "--set", "sets", metavar="KEY=VALUE", multiple=True, help="Set a value of the job, by dotted path."
+)
+OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace images that exist.")
+EXPOSURE = click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")

@@ -6,9 +6,10 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
-from quiltcli.render.report import FrameRecord
+if TYPE_CHECKING:
+    from quiltcli.render.report import FrameRecord
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from quiltcli import __version__
+from quiltcli import __version__, cli
 from quiltcli.cli import main
+from quiltcli.cli.group import COMMANDS
 from tests.helpers.tiny_job import IMAGES, SETTINGS, files_in, replaced, write_tiny_job
 
 EXISTS = "exists already and 11 more (use --resume to keep finished frames, --overwrite to replace them)"
@@ -76,7 +77,25 @@ def test_version() -> None:
 
 
 def test_the_commands_of_the_manual_are_there() -> None:
-    assert {"render", "pack", "check", "info", "unmap", "diff"} <= set(main.commands)
+    assert {"render", "pack", "check", "info", "unmap", "diff"} <= set(COMMANDS)
+
+
+def test_every_file_of_a_command_is_listed_and_answers_for_itself() -> None:
+    rest = {"__init__", "group", "options", "printing", "progress"}
+    files = {path.stem for path in Path(cli.__file__).parent.glob("*.py")} - rest
+    assert sorted(name.rstrip("_") for name in files) == sorted(COMMANDS)
+    for name in COMMANDS:
+        assert quilt(name, "--help").stdout.startswith(f"Usage: main {name} "), name
+
+
+def test_a_command_loads_no_other_command() -> None:
+    script = (
+        "import sys; from quiltcli.cli import main; main.main(['diff', '--help'], standalone_mode=False);"
+        "print(*(name for name in sys.modules if name.startswith('quiltcli.cli.')))"
+    )
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    loaded = {name.rpartition(".")[2] for name in found.stdout.splitlines()[-1].split()}
+    assert loaded == {"group", "options", "printing", "diff"}
 
 
 def test_no_command_shows_the_help() -> None:

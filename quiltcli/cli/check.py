@@ -1,0 +1,24 @@
+"""`quilt check`: every problem of a file."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from quiltcli.cli.options import PATH
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, type=PATH)
+def check(files: tuple[Path, ...]) -> None:
+    """Read FILES strictly and report every problem found."""
+    from quiltcli.analysis.check import check_files
+
+    problems = check_files(files)
+    for problem in problems:
+        click.echo(str(problem))
+    if problems:
+        sys.exit(1)
+    click.echo(f"{len(files)} file{'s' * (len(files) > 1)}: nothing is wrong", err=True)

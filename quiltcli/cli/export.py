@@ -1,0 +1,33 @@
+"""`quilt export`: a layout as a pixel map of other tools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from quiltcli.cli.options import PATH
+
+
+@click.command()
+@click.argument("layout", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="File to write; its suffix says the format.")
+@click.option(
+    "--format", "format_name", help="obj, csv, json, mpcdi, mpcdi1, st, png or svg, whatever the suffix."
+)
+@click.option("--display", type=PATH, help="Display file, instead of the one the layout names.")
+def export(layout: Path, output: Path, format_name: str | None, display: Path | None) -> None:
+    """Write LAYOUT as a pixel map other tools read.
+
+    Textured mesh (.obj), table of panels (.csv), JSON (.json), MPCDI (.mpcdi), ST maps (.exr), or a
+    template picture (.png, .svg).
+    """
+    from quiltcli.exchange.pixelmaps import known_display, write_map
+    from quiltcli.layout import read_layout
+
+    loaded = read_layout(layout)
+    written = write_map(loaded, known_display(loaded, display), output, format_name)
+    for path in written[:12]:
+        click.echo(str(path))
+    if len(written) > 12:
+        click.echo(f"and {len(written) - 12} more in {written[-1].parent}")

@@ -1,0 +1,39 @@
+"""`quilt import`: a pixel map of another tool as a layout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from quiltcli.cli.options import PATH, SIZE
+
+
+@click.command("import")
+@click.argument("file", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="Layout file to write.")
+@click.option("--format", "format_name", help="obj, csv, json or mpcdi, whatever the suffix.")
+@click.option("--display", type=PATH, help="Display the layout is for; says what the file does not.")
+@click.option("--size", type=SIZE, help="Page size such as 3840x2160, where the file does not say it.")
+@click.option("--picture", type=PATH, help="Draw the layout, as .png or .svg.")
+def import_(
+    file: Path,
+    output: Path,
+    format_name: str | None,
+    display: Path | None,
+    size: tuple[int, int] | None,
+    picture: Path | None,
+) -> None:
+    """Make a layout from a pixel map: .obj, .csv, .json or .mpcdi."""
+    from quiltcli.display import load_display
+    from quiltcli.exchange.pixelmaps import read_map
+    from quiltcli.job import load_display_file
+    from quiltcli.layout import layout_picture, write_layout
+
+    facets = load_display(load_display_file(display)) if display is not None else None
+    layout = read_map(file, facets, size=size, format_name=format_name)
+    write_layout(layout, output)
+    if picture is not None:
+        layout_picture(layout, picture, facets.names if facets else ())
+    pages = len(layout.pages)
+    click.echo(f"{layout.facet.size} facets on {pages} page{'s' * (pages > 1)}")

@@ -1,0 +1,50 @@
+"""`quilt pattern`: test patterns at exact pixels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from quiltcli.cli.options import OVERWRITE, PATH
+
+
+@click.command()
+@click.argument("layout", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="Folder for the images.")
+@click.option(
+    "--kind",
+    "kinds",
+    multiple=True,
+    default=("id",),
+    show_default=True,
+    help="id, marker, border, grid, checker, gradient, white, or all; may be given again.",
+)
+@click.option("--format", "image_format", default="png", show_default=True, help="png or exr.")
+@click.option("--step", type=int, default=32, show_default=True, help="Pixels between lines of a grid.")
+@click.option("--display", type=PATH, help="Display file, instead of the one the layout names.")
+@OVERWRITE
+def pattern(
+    layout: Path,
+    output: Path,
+    kinds: tuple[str, ...],
+    image_format: str,
+    step: int,
+    display: Path | None,
+    overwrite: bool,
+) -> None:
+    """Draw test patterns for LAYOUT at exact pixels: which facet, which way up, where it ends."""
+    from quiltcli.calibration.pattern import KINDS
+    from quiltcli.calibration.pattern_files import write_patterns
+    from quiltcli.exchange.pixelmaps import known_display
+    from quiltcli.layout import align, read_layout
+
+    loaded = read_layout(layout)
+    facets = known_display(loaded, display)
+    names = align(loaded, facets)[0].names if facets is not None else ()
+    chosen = tuple(KINDS) if "all" in kinds else tuple(dict.fromkeys(kinds))
+    paths = write_patterns(
+        loaded, output, chosen, image_format=image_format, names=names, step=step, overwrite=overwrite
+    )
+    for path in paths:
+        click.echo(str(path))

@@ -1,0 +1,100 @@
+"""`quilt render`: the frames of a job."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from quiltcli.cli.options import FACETS, FRAMES, OVERWRITE, PATH, SETS, THREADS
+from quiltcli.cli.printing import print_aligned
+
+
+@click.command()
+@click.argument("job", type=PATH)
+@click.option("-f", "--frames", type=FRAMES, help="Frames such as 1-240, 1-9x2 or 1,5,20-30; inclusive.")
+@click.option("-o", "--output", type=PATH, help="Output folder, instead of the job's.")
+@click.option("--resume", is_flag=True, help="Skip frames that are complete and made by the same job.")
+@OVERWRITE
+@click.option("--facets", type=FACETS, help="Draw only these facets, such as 3,7-9, into existing quilts.")
+@THREADS
+@click.option("--scheduler", metavar="ADDRESS", help="Hand the frames to a dask scheduler.")
+@click.option("--dry-run", is_flag=True, help="Find every problem, write nothing.")
+@click.option("--profile", is_flag=True, help="Say where the time went, by stage.")
+@SETS
+def render(
+    job: Path,
+    frames: tuple[int, ...] | None,
+    output: Path | None,
+    resume: bool,
+    overwrite: bool,
+    facets: tuple[int, ...] | None,
+    threads: int | None,
+    scheduler: str | None,
+    dry_run: bool,
+    profile: bool,
+    sets: tuple[str, ...],
+) -> None:
+    """Render the frames of JOB: quilts, facet images, report."""
+    from quiltcli.job import load_job
+    from quiltcli.render.sequence import RenderOptions
+
+    if resume and overwrite:
+        raise click.UsageError("--resume keeps finished frames and --overwrite replaces them: give one")
+    options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run)
+    records = _render(load_job(job, sets), options, scheduler)
+    if profile and records:
+        _print_profile(records)
+
+
+def _render(job: Any, options: Any, scheduler: str | None) -> Any:
+    """Render here or on a farm, with progress on stderr and the summary on stdout."""
+    from quiltcli.cli.progress import progress
+    from quiltcli.render.farm import render_on
+    from quiltcli.render.interrupt import Stopped
+    from quiltcli.render.report import summary_warnings
+    from quiltcli.render.sequence import Listener
+    from quiltcli.render.sequence import render as render_here
+
+    def work(*given: Any) -> Any:
+        return render_here(*given) if scheduler is None else render_on(scheduler, *given)
+
+    with progress() as shown:
+        try:
+            records = work(job, options, Listener(shown.begin, shown.frame_done, shown.say))
+        except Stopped as stopped:
+            shown.say(str(stopped))
+            sys.exit(stopped.exit_code)
+    for warning in summary_warnings(records):
+        click.echo(f"warning: {warning}", err=True)
+    if options.dry_run:
+        click.echo("nothing is wrong with this job")
+    elif records:
+        _print_summary(records)
+        click.echo(f"written to {options.folder or job.output.directory}")
+    else:
+        click.echo("every frame is complete already")
+    return records
+
+
+def _print_profile(records: Any) -> None:
+    """Where the time of the run went."""
+    from quiltcli.render.report import PROFILE_COLUMNS, profile_rows
+
+    click.echo()
+    print_aligned(PROFILE_COLUMNS, profile_rows(records))
+
+
+def _print_summary(records: Any) -> None:
+    """The summary table, plain where stdout is no terminal."""
+    from rich.console import Console
+
+    from quiltcli.render.report import summary, summary_table
+
+    if sys.stdout.isatty():
+        Console().print(summary_table(records))
+        return
+    for label, value in summary(records):
+        click.echo(f"{label:<24}{value}")

@@ -1,0 +1,67 @@
+"""`quilt simulate`: the lit display, seen from somewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from quiltcli.cli.options import EXPOSURE, FRAMES, PATH, POINT, SETS, SIZE, THREADS, VIEW
+
+
+@click.command()
+@click.argument("job", type=PATH)
+@click.option("-f", "--frames", type=FRAMES, help="Frames such as 7 or 1-12; the job's first by default.")
+@click.option("-o", "--output", type=PATH, help="PNG to write; #### in its name is the frame number.")
+@click.option("--video", type=PATH, help="Film to write of all the frames, as .mp4 or .mov.")
+@click.option("--size", type=SIZE, default="1200x900", show_default=True, help="Size of the picture.")
+@click.option("--from", "place", type=POINT, metavar="X,Y,Z", help="Look from here; from the eye by default.")
+@click.option("--look-at", type=POINT, metavar="X,Y,Z", help="Look there; at the display by default.")
+@click.option("--third-person", is_flag=True, help="Show the viewer too, with rays to the display's outline.")
+@click.option(
+    "--scene",
+    type=click.Choice(("ghost", "solid", "none")),
+    default="ghost",
+    help="As a third person sees it.",
+)
+@click.option("--fov", type=click.FloatRange(0, 170, min_open=True), help="Degrees from top to bottom.")
+@click.option("--filter", type=click.Choice(("nearest", "linear")), default="linear", show_default=True)
+@click.option(
+    "--supersample", type=click.IntRange(1, 16), default=2, show_default=True, help="Rays across a pixel."
+)
+@click.option(
+    "--compare/--no-compare",
+    default=None,
+    help="From the eye, compare with a direct picture; not for a film alone.",
+)
+@click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
+@click.option("--direct", type=PATH, help="Write the direct picture, as PNG.")
+@click.option("--heat-map", type=PATH, help="Write a picture of the errors, as PNG.")
+@click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")
+@EXPOSURE
+@THREADS
+@SETS
+def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], **how: Any) -> None:
+    """Light the display of JOB with its images and look at it.
+
+    From the viewer's eye the picture is compared with a direct one of the scene; the figures go to
+    stdout. The images are those that a render has left; where there are none they are drawn in memory.
+    """
+    from quiltcli.analysis.simulate import PictureOptions
+    from quiltcli.analysis.simulate.files import Pictures, write_pictures
+    from quiltcli.job import load_job
+
+    wanted = ("direct", "heat_map", "view", "exposure", "video")
+    pictures = Pictures(how.pop("output"), **{name: how.pop(name) for name in wanted})
+    if pictures.picture is None and pictures.video is None:
+        raise click.UsageError("nothing to write: give -o PICTURE.png, --video FILM.mp4, or both")
+    if how["compare"] is None:
+        how["compare"] = any((pictures.picture, pictures.direct, pictures.heat_map))
+    if how["size"] is None:
+        raise click.UsageError("--size: a picture needs a width and a height")
+    samples, threads = how.pop("supersample"), how.pop("threads") or 0
+    options = PictureOptions(samples=samples, threads=threads, resampled=True, **how)
+    loaded = load_job(job, sets)
+    for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures):
+        click.echo(line)
