@@ -25,6 +25,9 @@ class Crew(Protocol):
     def workers(self) -> int:
         """How many they are."""
 
+    def begin(self, stage: Stage) -> None:
+        """Turn to a stage that differs in its scene alone, which may have moved."""
+
     def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
         """Bin the scene."""
 
@@ -37,12 +40,16 @@ class Crew(Protocol):
         """Draw batches, as `draw_batch`; `stale` are microtiles (M,) of all blocks."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Threads:
     """A crew of threads of this process."""
 
     stage: Stage
     workers: int
+
+    def begin(self, stage: Stage) -> None:
+        """Turn to a stage that differs in its scene alone."""
+        self.stage = stage
 
     def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
         """Bin the scene, in one thread."""

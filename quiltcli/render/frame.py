@@ -51,6 +51,7 @@ def draw_frame(
     if only is not None:
         lit &= only
     with clock.stage("bin"):
+        crew.begin(stage)
         rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
         binned = crew.bin(viewer, rays)
     frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)

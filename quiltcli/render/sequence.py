@@ -178,7 +178,9 @@ def render_frames(
             writer.leave(len(sheets) - 1)
             if ready.only is not None:
                 read_quilt(stage, ready.out, view, sheets[turn])
-            record = draw_view(stage, view, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool)
+            record = draw_view(
+                stage.at(view.frame), view, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool
+            )
             writer.take(record, view, sheets[turn])
         writer.leave(0)
         request.check()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.packing import layout_for
 from quiltcli.scene import Scene, load_scene
+from quiltcli.scene.source import SceneSource
 from quiltcli.visibility.binning.pairs import Parts, facet_parts
 from quiltcli.visibility.draw import Blocks, cut_blocks
 
@@ -29,6 +30,7 @@ class Stage:
         blocks: the facets' rectangles, cut for the rasterizer.
         owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
         fill: share of the quilt's pixels that lie in facets.
+        source: gives the scene of each frame; None where nothing moves.
     """
 
     job: JobFile
@@ -39,6 +41,12 @@ class Stage:
     blocks: Blocks
     owners: OwnerArray
     fill: float
+    source: SceneSource | None = None
+
+    def at(self, frame: int) -> Stage:
+        """The stage with its scene as it is in a frame; itself where nothing moves."""
+        scene = self.source.scene_at(frame) if self.source else self.scene
+        return self if scene is self.scene else replace(self, scene=scene)
 
 
 def set_stage(job: JobFile) -> Stage:

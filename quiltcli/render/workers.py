@@ -2,9 +2,12 @@
 
 Threads gain little here: much of numpy holds the interpreter's lock. So the workers are forked once,
 with everything the frames share already in memory, and nothing of it is ever copied or sent. What
-changes from frame to frame is written into a shared arena, and pixels go straight into shared
-buffers: every pixel belongs to one batch, so nobody waits for anybody. Where processes cannot fork,
-`draw.draw_frame` draws in threads instead.
+changes from frame to frame, moving scenes too, is written into shared arrays, and pixels go straight
+into shared buffers: every pixel belongs to one batch, so nobody waits for anybody. Where processes
+cannot fork, `frame.draw_frame` draws in threads instead.
+
+    parent      begin ─ see ─┬─ bin ──┬─ clear ─┬─ draw ──┬─ …
+    workers       └─ tables ─┴─ vertices, shares of triangles, blocks, batches: whoever is free takes the next
 """
 
 from __future__ import annotations
@@ -30,16 +33,25 @@ from quiltcli.channels import exr_channels
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
 from quiltcli.projection.planar import QuiltRays, quilt_rays
+from quiltcli.render.arena import (
+    Arena,
+    arena_names,
+    arena_of,
+    fill_tables,
+    moved_scene,
+    new_arena,
+    share_scene,
+)
 from quiltcli.render.batch import Drawn, draw_batch
 from quiltcli.render.buffers import Buffers, clear_blocks
 from quiltcli.render.crew import Threads, plan_of
 from quiltcli.render.setup import Stage
+from quiltcli.render.shared import AttachedArrays, SharedArrays
 from quiltcli.viewer.viewer import Viewer
-from quiltcli.visibility.draw import BlockPairs, Frame, pairs_by_block
+from quiltcli.visibility.draw import Frame, pairs_by_block
 from quiltcli.visibility.shares import (
     Binned,
     BinPlan,
-    Seen,
     Share,
     bin_frame,
     bin_share,
@@ -48,8 +60,6 @@ from quiltcli.visibility.shares import (
     sight_of,
 )
 
-_ROOM = 8  # pairs a triangle there is room for; memory that is not touched costs nothing
-_LEAST_ROOM = 1 << 26
 _SHARES = 4  # of a worker in what can be cut at will, so that none waits long for the last
 _MANY_PIXELS = 1 << 20
 _MANY_TRIANGLES = 50_000
@@ -82,52 +92,18 @@ def shared_buffers(stage: Stage) -> Buffers:
 
 
 @dataclass(frozen=True)
-class _Arena:
-    """Where the arrays of the frame under way lie.
-
-    Attributes:
-        seen: what is known of vertices and triangles.
-        pairs: block pairs; those of triangle t lie from t·C/T on in the C numbers of their memory.
-    """
-
-    seen: Seen
-    pairs: BlockPairs
-
-    def frame_pairs(self) -> BlockPairs:
-        """The pairs of the frame under way; a record of its own, for it keeps what it has counted."""
-        return replace(self.pairs)
-
-    def begin(self, triangle: int) -> int:
-        """Where the pairs of a share that begins with this triangle lie."""
-        return triangle * (self.pairs.memory.size // max(len(self.seen.cut), 1))
-
-
-def _new_arena(stage: Stage, workers: int) -> _Arena:
-    vertices, triangles = len(stage.scene.vertices), len(stage.scene.triangles)
-    room = max(_ROOM * triangles, _LEAST_ROOM)
-    shares, blocks = _SHARES * workers, len(stage.blocks.facet)
-    return _Arena(
-        Seen(
-            shared_array(3 * vertices, np.float64).reshape(-1, 3),
-            shared_array(vertices, np.float64),
-            shared_array(vertices, np.int32),
-            shared_array(vertices, np.int32),
-            shared_array(triangles, np.bool_),
-        ),
-        BlockPairs(
-            shared_array(shares * blocks, np.int64).reshape(shares, blocks),
-            shared_array(shares * blocks, np.int64).reshape(shares, blocks),
-            shared_array(room, np.int32),
-        ),
-    )
-
-
-@dataclass(frozen=True)
 class _Task:
     """What a worker is told of a frame before its work: the viewer, and the facets (F,) that are drawn."""
 
     viewer: Viewer
     lit: BoolArray
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """A worker is told that the scene has moved: fields that are no arrays; the arrays follow."""
+
+    plain: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -187,7 +163,9 @@ class Pool:
     def __init__(self, stage: Stage, buffers: Sequence[Buffers], workers: int) -> None:
         self._stage = stage
         self._buffers = buffers
-        self._arena = _new_arena(stage, workers)
+        self._arrays = SharedArrays()
+        self._shares_of_triangles = _SHARES * workers
+        self._arena = self._new_arena(stage)
         self._frame = 0
         # Made once, before there are copies of the process.
         _ = stage.scene.planes, stage.scene.corner_normals, stage.scene.corner_colors
@@ -195,6 +173,7 @@ class Pool:
             _ = stage.scene.facing
         context = multiprocessing.get_context("fork")
         self._workers: list[_Worker] = []
+        self._known: list[set[int]] = [set() for _ in range(workers)]
         for _number in range(workers):
             ours, theirs = context.Pipe()
             place = _Workplace(stage, buffers, self._arena)
@@ -223,6 +202,24 @@ class Pool:
         for worker in self._workers:
             worker.process.join()
         self._workers = []
+        self._arrays.close()
+
+    def begin(self, stage: Stage) -> None:
+        """Turn to a stage that differs in its scene alone; nothing is done where that is still the same."""
+        old, new = self._stage.scene, stage.scene
+        self._stage = stage
+        if new is old:
+            return
+        plain, names = share_scene(self._arrays, old, new)
+        self._arena = self._new_arena(stage)
+        handles = self._arrays.handles([*names, *arena_names()])
+        for worker, known in zip(self._workers, self._known, strict=True):
+            worker.tell(self._frame, _Moved(plain))
+            self._arrays.send(worker.connection, handles, known)
+        self._share_out(_Item("tables", (part,)) for part in self._shares(len(new.triangles)))
+
+    def _new_arena(self, stage: Stage) -> Arena:
+        return new_arena(self._arrays, stage.scene, self._shares_of_triangles, len(stage.blocks.facet))
 
     def bin(self, viewer: Viewer, rays: QuiltRays) -> Binned:
         """Bin the scene.
@@ -294,8 +291,9 @@ class Pool:
 class _Workplace:
     """What a worker has at hand; its public methods are the work it can be given."""
 
-    def __init__(self, stage: Stage, buffers: Sequence[Buffers], arena: _Arena) -> None:
+    def __init__(self, stage: Stage, buffers: Sequence[Buffers], arena: Arena) -> None:
         self._stage, self._buffers, self._arena = stage, buffers, arena
+        self._arrays = AttachedArrays()
         self._plan: BinPlan | None = None
         self._frame: Frame | None = None
 
@@ -303,6 +301,16 @@ class _Workplace:
         """Turn to another frame."""
         rays = quilt_rays(self._stage.facets, self._stage.layout, task.lit, task.viewer.eye)
         self._plan, self._frame = plan_of(self._stage, task.viewer, rays), None
+
+    def move(self, moved: _Moved, connection: Connection) -> None:
+        """Take over a scene that has moved."""
+        arrays = self._arrays.receive(connection)
+        self._arena = arena_of(arrays)
+        self._stage = replace(self._stage, scene=moved_scene(self._stage.scene, moved.plain, arrays))
+
+    def tables(self, part: slice) -> None:
+        """Work out the tables of some triangles of a scene that has moved."""
+        fill_tables(self._stage.scene, part)
 
     def see(self, part: slice) -> None:
         """Find out about some of the vertices."""
@@ -357,6 +365,8 @@ def _serve(connection: Connection, place: _Workplace, parent: int) -> None:
             try:
                 if isinstance(given, _Task):
                     place.begin(given)
+                elif isinstance(given, _Moved):
+                    place.move(given, connection)
                 else:
                     connection.send(getattr(place, given.name)(*given.given))
             except Exception:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -93,9 +93,7 @@ class Scene:
     @cached_property
     def planes(self) -> FloatArray:
         """Planes (4, T) of the triangles: normal n by the winding, and n·p for the points p of the plane."""
-        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
-        normal = cross(b - a, c - a)
-        return np.concatenate((normal.T, dot(normal, a)[None]))
+        return planes_of(self.vertices, self.triangles)
 
     @cached_property
     def facing(self) -> FloatArray:
@@ -125,20 +123,45 @@ class Scene:
         The first corner's normal, what to add to it for the second and the third corner, and the
         triangle's own unit normal. Flat triangles have their own normal at all corners.
         """
-        table = np.empty((len(self.triangles), 12), dtype=np.float32)
-        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
-        own = normalized(cross(b - a, c - a)).astype(np.float32)
-        table[:, 0:9] = _corner_table(self.normals, self.triangles)
-        table[:, 9:12] = own
-        flat = np.flatnonzero(self.flat)
-        table[flat, 0:3] = own[flat]
-        table[flat, 3:9] = 0.0
-        return table
+        return corner_normals_of(self.vertices, self.triangles, self.normals, self.flat)
 
     @cached_property
     def corner_colors(self) -> Float32Array | None:
         """The first corner's colour, and what to add for the others (T, 9); None where all are 1."""
         return None if bool((self.colors == 1).all()) else _corner_table(self.colors, self.triangles)
+
+    def knowing(self, **tables: object) -> Scene:
+        """The same scene with some of the tables above, which need not be worked out then."""
+        known = replace(self)
+        known.__dict__.update(tables)
+        return known
+
+
+def facing_anywhere(count: int) -> FloatArray:
+    """`Scene.facing` (4, V) of vertices of whose triangles nothing is known: they may face every way."""
+    return np.broadcast_to(np.array([[0.0], [0.0], [0.0], [1.0]]), (4, count))
+
+
+def planes_of(vertices: FloatArray, triangles: Int32Array) -> FloatArray:
+    """Planes (4, T) of triangles (T, 3): normal n by the winding, and n·p for the points p of the plane."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normal = cross(b - a, c - a)
+    return np.concatenate((normal.T, dot(normal, a)[None]))
+
+
+def corner_normals_of(
+    vertices: FloatArray, triangles: Int32Array, normals: Float32Array, flat: BoolArray
+) -> Float32Array:
+    """`Scene.corner_normals` (T, 12) of triangles (T, 3), some of which (T,) are flat."""
+    table = np.empty((len(triangles), 12), dtype=np.float32)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    own = normalized(cross(b - a, c - a)).astype(np.float32)
+    table[:, 0:9] = _corner_table(normals, triangles)
+    table[:, 9:12] = own
+    alone = np.flatnonzero(flat)
+    table[alone, 0:3] = own[alone]
+    table[alone, 3:9] = 0.0
+    return table
 
 
 def _corner_table(values: Float32Array, triangles: Int32Array) -> Float32Array:

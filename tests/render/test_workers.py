@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from quiltcli.errors import CheckFailedError
+from quiltcli.render import arena
 from quiltcli.render import workers as pools
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
@@ -60,13 +62,53 @@ def test_a_frame_does_not_show_the_frames_before_it(background):
 
 
 def test_more_pairs_than_there_is_room_for_are_drawn_all_the_same(stage, monkeypatch):
-    monkeypatch.setattr(pools, "_ROOM", 0)
-    monkeypatch.setattr(pools, "_LEAST_ROOM", 100)
+    monkeypatch.setattr(arena, "ROOM", 0)
+    monkeypatch.setattr(arena, "LEAST_ROOM", 100)
     alone, together = new_buffers(stage), shared_buffers(stage)
     with Pool(stage, [together], 2) as pool:
         draw_frame(stage, viewer(EYES[0]), alone)
         draw_frame(stage, viewer(EYES[0]), together, crew=pool)
     np.testing.assert_array_equal(alone["Z"], together["Z"])
+
+
+def scenes_of_a_ball(moved: int, split: int):
+    """A ball that moves, and two frames later has more triangles, and other lights."""
+    lamps = lights(sun=[(-1, -1, -1)], color=[(2, 2, 2)], ambient=(0.1, 0.1, 0.1))
+    still = ball_scene(3, 0.9, lamps, (0.1, 0, 0.2))
+    for step in range(moved):
+        yield replace(still, vertices=still.vertices + [0.1 * step, 0, 0])
+    yield ball_scene(split, 0.8, lights(sun=[(1, -1, 0)], color=[(1, 2, 1)]), (0.1, 0, 0.2))
+    yield still
+
+
+@pytest.mark.parametrize("culling", [False, True])
+def test_workers_see_a_scene_that_moves_grows_and_shrinks(stage, culling):
+    how = stage.job.render.model_copy(update={"backface_culling": culling})
+    stage = replace(stage, job=stage.job.model_copy(update={"render": how}))
+    alone, together = new_buffers(stage), shared_buffers(stage)
+    dirty = np.zeros(stage.blocks.used.size, bool)
+    pictures = []
+    with Pool(stage, [together], 2) as pool:
+        for scene in scenes_of_a_ball(3, 5):
+            now = replace(stage, scene=scene)
+            draw_frame(now, viewer(EYES[0]), alone)
+            draw_frame(now, viewer(EYES[0]), together, dirty=dirty, crew=pool)
+            for name in alone:
+                np.testing.assert_array_equal(alone[name], together[name], err_msg=name)
+            pictures.append(alone["Z"].tobytes())
+    assert len(set(pictures)) == 4
+
+
+def test_memory_is_not_made_anew_for_frames_of_one_size(stage):
+    together = shared_buffers(stage)
+    with Pool(stage, [together], 2) as pool:
+        for step in range(4):
+            vertices = stage.scene.vertices + [0.01 * step, 0, 0]
+            moved = replace(stage, scene=replace(stage.scene, vertices=vertices))
+            draw_frame(moved, viewer(EYES[0]), together, crew=pool)
+            made = pool._arrays._made
+            assert step < 2 or made == before
+            before = made
 
 
 def children() -> set[int]:

@@ -114,9 +114,9 @@ def simulate(
     stage = set_stage(with_channels(job, ("rgba",)))
     threads = options.threads or default_threads()
     for view in views:
-        viewer = view.viewer
-        shown, source = shown_images(stage, view, job.output.directory, sha, threads)
-        yield replace(take_picture(stage, viewer, shown, options), source=source)
+        now, viewer = stage.at(view.frame), view.viewer
+        shown, source = shown_images(now, view, job.output.directory, sha, threads)
+        yield replace(take_picture(now, viewer, shown, options), source=source)
 
 
 def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:

@@ -70,7 +70,7 @@ class FrameView:
 
 def frame_images(folder: Folder, frame: int) -> Shown:
     """The images of a frame."""
-    stage = folder.stage
+    stage = folder.stage.at(frame)
     view = views_at(stage.job, frame)[0]
     sha = images_sha(folder, frame)
     return shown_images(stage, view, folder.path, sha, default_threads())[0]
@@ -89,7 +89,9 @@ def frame_view(folder: Folder, frame: int, errors: bool) -> FrameView:
 def _with_errors(folder: Folder, seen: FrameView) -> FrameView:
     """The frame with the errors that `quilt simulate` finds in it."""
     shown = frame_images(folder, seen.viewer.frame)
-    comparison = take_picture(folder.stage, seen.viewer, shown, PictureOptions(size=_HEAT)).comparison
+    comparison = take_picture(
+        folder.stage.at(seen.viewer.frame), seen.viewer, shown, PictureOptions(size=_HEAT)
+    ).comparison
     if comparison is None:
         return seen
     scale = heat_scale(comparison.error)

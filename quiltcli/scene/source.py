@@ -1,0 +1,18 @@
+"""Where the scene of each frame comes from, when something in it moves."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from quiltcli.scene.scene import Scene
+
+
+class SceneSource(Protocol):
+    """Gives the scene of any frame; the frame number alone decides."""
+
+    def scene_at(self, frame: int) -> Scene:
+        """The scene as it is in a frame.
+
+        Arrays that are as they were in another frame should be the same objects: what is the same is
+        neither copied to workers nor worked out again.
+        """
