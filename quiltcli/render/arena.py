@@ -99,9 +99,11 @@ def share_scene(arrays: SharedArrays, old: Scene, new: Scene) -> tuple[dict[str,
 
 def moved_scene(scene: Scene, plain: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Scene:
     """The scene that `share_scene` has shared, on a worker's side; its tables hold nothing yet."""
-    new = {name.removeprefix("scene."): array for name, array in arrays.items() if name.startswith("scene.")}
+    new: dict[str, Any] = {
+        name.removeprefix("scene."): array for name, array in arrays.items() if name.startswith("scene.")
+    }
     found = replace(scene, **plain, **new)
-    tables = {name: arrays[f"table.{name}"] for name in _TABLES}
+    tables: dict[str, Any] = {name: arrays[f"table.{name}"] for name in _TABLES}
     tables["facing"] = facing_anywhere(len(found.vertices))
     if found.colors is scene.colors and found.triangles is scene.triangles:
         tables["corner_colors"] = scene.corner_colors

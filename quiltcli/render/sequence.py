@@ -178,9 +178,8 @@ def render_frames(
             writer.leave(len(sheets) - 1)
             if ready.only is not None:
                 read_quilt(stage, ready.out, view, sheets[turn])
-            record = draw_view(
-                stage.at(view.frame), view, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool
-            )
+            now = stage.at(view.frame)
+            record = draw_view(now, view, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool)
             writer.take(record, view, sheets[turn])
         writer.leave(0)
         request.check()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -130,7 +131,7 @@ class Scene:
         """The first corner's colour, and what to add for the others (T, 9); None where all are 1."""
         return None if bool((self.colors == 1).all()) else _corner_table(self.colors, self.triangles)
 
-    def knowing(self, **tables: object) -> Scene:
+    def knowing(self, **tables: Any) -> Scene:
         """The same scene with some of the tables above, which need not be worked out then."""
         known = replace(self)
         known.__dict__.update(tables)

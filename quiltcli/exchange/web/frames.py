@@ -89,9 +89,8 @@ def frame_view(folder: Folder, frame: int, errors: bool) -> FrameView:
 def _with_errors(folder: Folder, seen: FrameView) -> FrameView:
     """The frame with the errors that `quilt simulate` finds in it."""
     shown = frame_images(folder, seen.viewer.frame)
-    comparison = take_picture(
-        folder.stage.at(seen.viewer.frame), seen.viewer, shown, PictureOptions(size=_HEAT)
-    ).comparison
+    stage = folder.stage.at(seen.viewer.frame)
+    comparison = take_picture(stage, seen.viewer, shown, PictureOptions(size=_HEAT)).comparison
     if comparison is None:
         return seen
     scale = heat_scale(comparison.error)
