@@ -36,6 +36,7 @@ COMPRESSIONS = (
     *("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256"),  # lossless
     *("pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k"),  # lossy
 )
+CLIPS = ("auto", "planar", "distance")
 UNLIT = ("write", "link", "skip")
 DATA_WINDOWS = ("full", "tight")
 # Decimal rates that stand for fractions in film and television.
@@ -103,13 +104,23 @@ class RenderSpec(Model):
     """Bits of an emulated GPU's depth buffer; exact depth when absent."""
     depth: Annotated[str, OneOf(("planar", "radial"))] = "planar"
     """Z along the look direction (planar) or the distance from the eye (radial)."""
+    clip: Annotated[str, OneOf(CLIPS)] = "auto"
+    """What near and far cut: along the look direction (planar), by the distance from the eye (distance), or
+    planar where depth is planar and every lit pixel of every frame lies ahead of the eye (auto)."""
     backface_culling: bool = False
     """Drop triangles that face away from the viewer."""
     bleed: Natural = 2
     """Pixels rendered past a facet's edge into the padding."""
 
+    def needs_planar_clip(self, channels: Sequence[str]) -> bool:
+        """Whether something is asked for that lies between a near and a far plane."""
+        return "zv" in channels or self.depth_bits is not None or self.method not in ("homography", "raycast")
+
     def cross_checks(self) -> Iterator[Complaint]:
-        """Rays have neither a depth buffer nor several samples."""
+        """Rays have neither a depth buffer nor several samples; depth buffers lie between planes."""
+        if self.clip == "distance" and self.needs_planar_clip(()):
+            what = "depth_bits" if self.depth_bits is not None else f"method: {self.method}"
+            yield ("clip",), f"{what} needs a near and a far plane (expected planar or auto), got distance"
         if self.method == "raycast" and self.depth_bits is not None:
             yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
         if self.method == "raycast" and self.samples > 1:
@@ -152,6 +163,12 @@ def _twice(channels: Sequence[str]) -> Iterator[Complaint]:
 
 class JobFile(FileModel):
     """A render job."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """The canonical depth lies between a near and a far plane."""
+        if self.render.clip == "distance" and "zv" in self.output.channels:
+            words = "zv lies between a near and a far plane (expected planar or auto), got distance"
+            yield ("render", "clip"), words
 
     kind: ClassVar[str] = "quilt_job"
 

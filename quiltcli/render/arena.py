@@ -18,7 +18,7 @@ from quiltcli.visibility.shares import Seen
 ROOM = 8
 """Pairs a triangle there is room for; memory that is not touched costs nothing."""
 LEAST_ROOM = 1 << 26
-_SEEN = ("vertices", "depth", "core", "block", "cut")
+_SEEN = ("vertices", "reach", "core", "block", "cut")
 _PAIRS = ("first", "count", "memory")
 _TABLES = ("planes", "corner_normals")
 
@@ -50,7 +50,7 @@ def new_arena(arrays: SharedArrays, scene: Scene, shares: int, blocks: int) -> A
     room = max(ROOM * triangles, LEAST_ROOM)
     wanted: dict[str, tuple[tuple[int, ...], Any]] = {
         "seen.vertices": ((vertices, 3), np.float64),
-        "seen.depth": ((vertices,), np.float64),
+        "seen.reach": ((vertices,), np.float64),
         "seen.core": ((vertices,), np.int32),
         "seen.block": ((vertices,), np.int32),
         "seen.cut": ((triangles,), np.bool_),

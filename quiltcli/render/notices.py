@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from quiltcli.display import Facets, pitch_mm
-from quiltcli.geometry import BoolArray, dot
+from quiltcli.display import pitch_mm
+from quiltcli.geometry import BoolArray
 from quiltcli.render.setup import Stage
+from quiltcli.viewer.clip import behind_words
 from quiltcli.viewer.viewer import Viewer
 
 
@@ -20,20 +19,8 @@ def frame_warnings(stage: Stage, viewer: Viewer, lit: BoolArray, pairs: int, vis
         yield "no triangle of the scene shows on any facet"
     elif not visible:
         yield "no pixel shows the scene"
-    if viewer.depth == "planar":
-        behind = int(np.count_nonzero(lit & facets_behind(stage.facets, viewer)))
-        if behind:
-            yield (
-                f"{behind} lit facets lie wholly behind the eye, where planar depth draws nothing"
-                " (render.depth: radial draws all around)"
-            )
-
-
-def facets_behind(facets: Facets, viewer: Viewer) -> BoolArray:
-    """Facets (F,) no corner of which lies ahead of the eye along the look direction."""
-    ahead = dot(facets.corners - viewer.eye, viewer.look)
-    result: BoolArray = np.maximum.reduceat(ahead, facets.corner_start[:-1]) <= 0
-    return result
+    if words := behind_words(stage.facets, [viewer]):
+        yield words
 
 
 def stage_warnings(stage: Stage) -> Iterator[str]:

@@ -136,8 +136,9 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
         QuiltError: bad input, or files that are in the way.
     """
     frames = list(job.frames if options.frames is None else options.frames)
-    views = views_of(job, frames)
+    views_of(job, frames)  # what is wrong with the path is said before anything is loaded
     stage = set_stage(job)
+    views = stage.views(frames)
     viewers = [viewer for view in views for viewer in view.viewers]
     raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
     only = chosen_facets(stage, options.facets)

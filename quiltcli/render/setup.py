@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,6 +15,8 @@ from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.packing import layout_for
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.source import SceneSource
+from quiltcli.viewer.clip import settled_clip
+from quiltcli.viewer.view import View, views_of
 from quiltcli.visibility.binning.pairs import Parts, facet_parts
 from quiltcli.visibility.draw import Blocks, cut_blocks
 
@@ -42,6 +46,15 @@ class Stage:
     owners: OwnerArray
     fill: float
     source: SceneSource | None = None
+
+    @cached_property
+    def clip(self) -> str:
+        """What near and far cut in all frames, `planar` or `distance`."""
+        return settled_clip(self.job, self.facets)
+
+    def views(self, frames: Iterable[int]) -> list[View]:
+        """The views of some frames; errors as for `viewer.view.views_of`."""
+        return views_of(self.job, frames, self.clip)
 
     def at(self, frame: int) -> Stage:
         """The stage with its scene as it is in a frame; itself where nothing moves."""

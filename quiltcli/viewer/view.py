@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from quiltcli.errors import Problem, QuiltError, ViewerError, raise_all
 from quiltcli.job import JobFile
@@ -45,17 +45,23 @@ class View:
         return self.frame, self.eye
 
 
-def views_at(job: JobFile, frame: int) -> tuple[View, ...]:
+def views_at(job: JobFile, frame: int, clip: str | None = None) -> tuple[View, ...]:
     """The views of a frame, in the order in which they are drawn; the frame number alone decides.
+
+    Args:
+        job: the job.
+        frame: frame number.
+        clip: what near and far cut, `planar` or `distance`, where that has been settled.
 
     Raises:
         ViewerError: a path gives no usable pose at this frame.
     """
-    return (View(frame, "", (viewer_at(job.viewer, frame, job.render.depth),)),)
+    viewer = replace(viewer_at(job.viewer, frame, job.render.depth), clip=clip)
+    return (View(frame, "", (viewer,)),)
 
 
-def views_of(job: JobFile, frames: Iterable[int]) -> list[View]:
-    """The views of some frames.
+def views_of(job: JobFile, frames: Iterable[int], clip: str | None = None) -> list[View]:
+    """The views of some frames; for `clip` see `views_at`.
 
     Raises:
         ViewerError: with the problems of the paths, each said once, twenty at most.
@@ -64,7 +70,7 @@ def views_of(job: JobFile, frames: Iterable[int]) -> list[View]:
     problems: dict[Problem, None] = {}
     for frame in frames:
         try:
-            views += views_at(job, frame)
+            views += views_at(job, frame, clip)
         except QuiltError as error:
             problems |= dict.fromkeys(error.problems)
             if len(problems) >= 20:

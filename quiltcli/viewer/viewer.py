@@ -27,6 +27,8 @@ class Viewer:
         near: nearest depth that is drawn, metres.
         far: farthest depth that is drawn, metres.
         depth: `planar` measures Z along `look`; `radial` is the distance from the eye.
+        clip: whether near and far cut along `look` (`planar`) or by the distance from the eye (`distance`);
+            None for as depth is measured.
         head: (3,) place between the eyes, world metres; None where there is one eye, at the head's place.
         name: of whoever looks, empty where there is nobody else.
         facets: ids of the only facets that are theirs; None for all.
@@ -39,6 +41,7 @@ class Viewer:
     near: float
     far: float
     depth: str
+    clip: str | None = None
     head: FloatArray | None = None
     name: str = ""
     facets: tuple[int, ...] | None = None
@@ -53,8 +56,20 @@ class Viewer:
 
         Along the look direction, or the distance from the eye where depth is `radial`.
         """
+        return self._measured(position, by_distance=self.depth == "radial")
+
+    @property
+    def by_distance(self) -> bool:
+        """Whether near and far cut by the distance from the eye."""
+        return (self.clip == "distance") if self.clip else self.depth == "radial"
+
+    def reach_of(self, position: FloatArray) -> FloatArray:
+        """What near and far cut, (...) float64 of points (3, ...) given relative to the eye, metres."""
+        return self._measured(position, by_distance=self.by_distance)
+
+    def _measured(self, position: FloatArray, *, by_distance: bool) -> FloatArray:
         x, y, z = position
-        if self.depth == "radial":
+        if by_distance:
             return np.asarray(np.sqrt(x * x + y * y + z * z))
         return np.asarray(x * self.look[0] + y * self.look[1] + z * self.look[2])
 

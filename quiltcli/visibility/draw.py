@@ -170,7 +170,9 @@ def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.
     canvas = new_canvas(block, frame.blocks)
     rays = ray_matrices(frame.rays.eye_from_quilt, frame.blocks, block, sample)
     viewer = frame.viewer
-    limits = DepthRange(viewer.near, viewer.far, viewer.depth == "radial", viewer.look, rays)
+    limits = DepthRange(
+        viewer.near, viewer.far, viewer.by_distance, viewer.depth == "radial", viewer.look, rays
+    )
     by = None if frame.order is None else BatchOrder(frame.order, limits, frame.blocks.facet[block])
     matrices = block_matrices(frame.rays, frame.blocks, block, sample)
     pairs = warp(frame.sight, frame.pairs, frame.blocks, block, matrices)

@@ -34,7 +34,7 @@ class Seen:
 
     Attributes:
         vertices: (V, 3) world minus eye, metres.
-        depth: (V,) as the viewer measures it, metres.
+        reach: (V,) what near and far cut, metres.
         core: (V,) part of the display whose core the ray through the vertex meets; −1 for none, and where
             all triangles at the vertex are left out because they face away.
         block: (V,) the block that it lies well inside of, −1 for none.
@@ -42,7 +42,7 @@ class Seen:
     """
 
     vertices: FloatArray
-    depth: FloatArray
+    reach: FloatArray
     core: Int32Array
     block: Int32Array
     cut: BoolArray
@@ -125,7 +125,7 @@ def unseen(scene: Scene) -> Seen:
 def see_vertices(plan: BinPlan, part: slice, seen: Seen) -> None:
     """Find out about some of the vertices and write it down."""
     vertices = np.subtract(plan.scene.vertices[part], plan.viewer.eye, out=seen.vertices[part])
-    seen.depth[part] = plan.viewer.depth_of(vertices.T)
+    seen.reach[part] = plan.viewer.reach_of(vertices.T)
     if plan.culling:
         asked = np.flatnonzero(may_face(plan.scene.facing[:, part], vertices))
         core = np.full(len(vertices), -1, dtype=np.int32)
@@ -140,7 +140,7 @@ def see_vertices(plan: BinPlan, part: slice, seen: Seen) -> None:
 def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     """Bin some of the triangles, once all vertices are seen; writes down which of them are cut."""
     scene, eye = plan.scene, plan.viewer.eye
-    wanted, cut = triangles_in_range(seen.depth, seen.vertices, scene.triangles[part], plan.viewer)
+    wanted, cut = triangles_in_range(seen.reach, seen.vertices, scene.triangles[part], plan.viewer)
     seen.cut[part] = cut
     if plan.culling:
         wanted &= faces_eye(scene.planes[:, part], eye)

@@ -14,7 +14,6 @@ from quiltcli.analysis.verify.pixels import Trial
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.job import JobFile, load_job
 from quiltcli.render.setup import Stage, set_stage
-from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 from tests.helpers.in_memory import CUBE, CUBE_FACES, icosphere
 
@@ -106,7 +105,7 @@ class Shot:
 
 def shoot(job: JobFile) -> Shot:
     stage = set_stage(job)
-    viewer = viewers_of(job, list(job.frames))[0]
+    viewer = stage.views(list(job.frames))[0].viewer
     return Shot(stage, viewer, draw_images(stage, viewer, threads=1))
 
 

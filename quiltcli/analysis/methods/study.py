@@ -121,8 +121,9 @@ def compare(job: JobFile, options: CompareOptions | None = None) -> Study:
     """
     options = options or CompareOptions()
     frame = job.frames[0] if options.frame is None else options.frame
-    viewers = viewers_of(job, [frame])
+    viewers_of(job, [frame])
     stage = set_stage(with_variant(job, REFERENCE)).at(frame)
+    viewers = stage.views([frame])[0].viewers
     raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
     variants = (REFERENCE, *(v for v in dict.fromkeys(options.variants) if v != REFERENCE))
     threads = options.threads or default_threads()

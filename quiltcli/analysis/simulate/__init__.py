@@ -109,11 +109,11 @@ def simulate(
         QuiltError: bad input, or images that cannot be read.
     """
     options = options or PictureOptions()
-    views = views_of(job, frames)
+    views_of(job, frames)  # what is wrong with the path is said before anything is loaded
     sha = job_sha256(job)
     stage = set_stage(with_channels(job, ("rgba",)))
     threads = options.threads or default_threads()
-    for view in views:
+    for view in stage.views(frames):
         now, viewer = stage.at(view.frame), view.viewer
         shown, source = shown_images(now, view, job.output.directory, sha, threads)
         yield replace(take_picture(now, viewer, shown, options), source=source)

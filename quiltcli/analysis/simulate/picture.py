@@ -51,7 +51,7 @@ def first_triangles(
 ) -> tuple[Int32Array, Float32Array]:
     """The triangle of a scene (P,) that every ray meets first, from either side, −1 for none; how far."""
     # Everything from a micrometre on: the viewer's near and far are for the scene, not for the display.
-    here = replace(camera, near=1e-6, far=1e6, depth="radial")
+    here = replace(camera, near=1e-6, far=1e6, depth="radial", clip=None)
     job = exact(with_channels(stage.job, ("triangle", "Z")), samples=1, backface_culling=False)
     bare = camera_stage(job, through, scene)
     buffers = new_buffers(bare)

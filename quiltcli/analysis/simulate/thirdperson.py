@@ -240,7 +240,7 @@ def _with_scene(
     job = exact(with_channels(stage.job, ("rgba", "Z")), samples=1)
     direct = camera_stage(job, through, stage.scene)
     buffers = new_buffers(direct)
-    draw_frame(direct, replace(camera, near=1e-3, far=1e6, depth="radial"), buffers, threads)
+    draw_frame(direct, replace(camera, near=1e-3, far=1e6, depth="radial", clip=None), buffers, threads)
     there, before = buffers["A"] > 0, buffers["Z"] < depth
     share = there * (before if solid else np.where(before, _BEFORE, _BEHIND))
     color = np.stack([buffers[name].astype(np.float32) for name in "RGB"])

@@ -48,10 +48,11 @@ def judge(
     shown = _shown(tests, drawn, z)
     seen = shown >= 0
     depth = np.where(seen, tests.depth[shown], np.inf)
-    hidden = _hidden(tests, depth, shown)
+    distance = np.where(seen, tests.distance[shown], np.inf)
+    hidden = _hidden(tests, distance, shown)
     first = _at(tests, np.arange(z.size), named[0])
     close = seen & (first >= 0) & (first != shown)
-    close &= np.abs(depth - tests.depth[first]) <= CLOSE * np.where(seen, depth, 1.0)
+    close &= np.abs(distance - tests.distance[first]) <= CLOSE * np.where(seen, distance, 1.0)
     right_depth = np.abs(np.where(covered, z, 0) - np.where(seen, depth, 0)) <= depth_tolerance(
         np.where(seen, depth, 0)
     )
@@ -76,15 +77,17 @@ def _shown(tests: Tests, drawn: IntArray, z: FloatArray) -> IntArray:
     return result
 
 
-def _hidden(tests: Tests, depth: FloatArray, shown: IntArray) -> BoolArray:
-    """Pixels (N,) whose ray meets a surface nearer than `depth` (N,).
+def _hidden(tests: Tests, distance: FloatArray, shown: IntArray) -> BoolArray:
+    """Pixels (N,) whose ray meets a surface nearer than `distance` (N,).
 
     A centre inside one triangle meets it; so does one on the edges of two, where they join.
     """
-    nearer = tests.depth < depth[tests.row] * (1 - CLOSE)
+    nearer = tests.distance < distance[tests.row] * (1 - CLOSE)
     nearer &= shown[tests.row] != np.arange(tests.row.size)
-    surely = np.bincount(tests.row, weights=nearer & (tests.inside > BESIDE), minlength=depth.size)
-    on_edge = np.bincount(tests.row, weights=nearer & (np.abs(tests.inside) <= BESIDE), minlength=depth.size)
+    surely = np.bincount(tests.row, weights=nearer & (tests.inside > BESIDE), minlength=distance.size)
+    on_edge = np.bincount(
+        tests.row, weights=nearer & (np.abs(tests.inside) <= BESIDE), minlength=distance.size
+    )
     result: BoolArray = (surely >= 1) | (on_edge >= 2)
     return result
 

@@ -125,8 +125,9 @@ def verify(job: JobFile, options: VerifyOptions | None = None) -> tuple[Verdict,
     """
     options = options or VerifyOptions()
     frame = job.frames[0] if options.frame is None else options.frame
-    [view] = views_of(job, [frame])
+    views_of(job, [frame])  # what is wrong with the path is said before anything is loaded
     stage = set_stage(job).at(frame)
+    [view] = stage.views([frame])
     raise_all(ViewerError, eye_problems(stage.facets, view.viewers, job.viewer.source))
     threads = options.threads or default_threads()
     folder = options.folder or job.output.directory

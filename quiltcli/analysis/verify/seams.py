@@ -20,6 +20,8 @@ from quiltcli.display import SharedEdges
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, normalized, segments
 from quiltcli.visibility.rays.embree import Target, measure_along
 
+_ACROSS = 0.05  # depth gained along a unit ray
+
 COUNTS: Mapping[str, str] = {
     "edges": "seams between lit facets",
     "edges_compared": "seams compared",
@@ -130,7 +132,7 @@ def check_seams(trial: Trial, points: SeamPoints) -> Seams:
     a, b = (_carried(trial.target, seen, side, direction) for side in back)
     met: BoolArray = np.isfinite(a) & np.isfinite(b)
     rows, back, a, b = rows[met], back[:, met], a[met], b[met]
-    jump, tolerance = np.abs(a - b), depth_tolerance(np.maximum(a, b))
+    jump, tolerance = np.abs(a - b), depth_tolerance(np.maximum(np.abs(a), np.abs(b)))
     over = np.flatnonzero(jump > tolerance)
     counts = {
         "edges": points.edges,
@@ -155,11 +157,13 @@ def _carried(target: Target, seen: Sighting, rows: IntArray, direction: FloatArr
         + seen.pixels.ray[rows, :, 2]
     )
     normal = target.plane[seen.named[0, rows], :3]
-    shown = ray * (seen.z[rows] / measure_along(target.viewer, ray))[:, None]
+    # A ray across the look direction says next to nothing of where along it a point of some depth lies.
+    gain, along = measure_along(target.viewer, ray), measure_along(target.viewer, direction)
+    tells = (np.abs(gain) > _ACROSS) & (np.abs(along) > _ACROSS)
+    shown = ray * (seen.z[rows] / np.where(tells, gain, 1.0))[:, None]
     slope = dot(normal, direction)
     distance = np.divide(dot(normal, shown), slope, out=np.full(slope.shape, np.nan), where=slope != 0)
-    depth = distance * measure_along(target.viewer, direction)
-    return np.where((distance > 0) & (depth > 0), depth, np.nan)
+    return np.where(tells & (distance > 0), distance * along, np.nan)
 
 
 def _fault(seen: Sighting, rows: IntArray, a: float, b: float) -> Fault:

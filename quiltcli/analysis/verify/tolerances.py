@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from quiltcli.geometry import FloatArray
 
 CLOSE = 1e-5
@@ -13,5 +15,5 @@ BESIDE = 2e-6
 
 def depth_tolerance(depth: FloatArray) -> FloatArray:
     """Metres by which a depth may be off."""
-    result: FloatArray = 2e-6 * depth + 1e-6
+    result: FloatArray = 2e-6 * np.abs(depth) + 1e-6
     return result

@@ -71,7 +71,7 @@ class FrameView:
 def frame_images(folder: Folder, frame: int) -> Shown:
     """The images of a frame."""
     stage = folder.stage.at(frame)
-    view = views_at(stage.job, frame)[0]
+    view = stage.views([frame])[0]
     sha = images_sha(folder, frame)
     return shown_images(stage, view, folder.path, sha, default_threads())[0]
 
@@ -79,7 +79,7 @@ def frame_images(folder: Folder, frame: int) -> Shown:
 def frame_view(folder: Folder, frame: int, errors: bool) -> FrameView:
     """What is seen in a frame, and how far off it is where `errors` are asked for."""
     stage = folder.stage
-    viewer = views_at(stage.job, frame)[0].viewer
+    viewer = stage.views([frame])[0].viewer
     camera, fov = frame_display(viewer, stage.facets.corners, ASPECT, turn=True)
     lit = lit_facets(stage.facets, viewer.eye) & (stage.layout.page >= 0)
     found = FrameView(viewer, camera, fov, lit, None, ())

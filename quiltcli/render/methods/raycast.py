@@ -24,7 +24,7 @@ from quiltcli.render.setup import Stage
 from quiltcli.shading.aovs import fill
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Hits
-from quiltcli.visibility.rays.embree import Target, aim, cast, plane_depth, plane_distance
+from quiltcli.visibility.rays.embree import Target, aim, cast, plane_distance, reach_along
 from quiltcli.visibility.rays.exact import Neighbours, intersect
 from quiltcli.visibility.rays.pixels import OFFSETS, Places, places
 from quiltcli.visibility.resolve.hits import point_hits
@@ -157,11 +157,14 @@ def _nearest(
     result = np.full(rows.size, -1)
     around, triangle = neighbours.around(which, named.T[which, column])
     tests = intersect(target, pixels, rows[around], triangle, LATTICE)
-    depth = plane_depth(target, triangle, pixels.directions()[rows[around]])
-    hit = np.flatnonzero((tests.inside >= 0) & (depth >= target.viewer.near) & (depth <= target.viewer.far))
+    ray = pixels.directions()[rows[around]]
+    distance = plane_distance(target, triangle, ray)
+    with np.errstate(invalid="ignore"):  # infinity times 0
+        reach = distance * reach_along(target.viewer, ray)
+    hit = np.flatnonzero((tests.inside >= 0) & (reach >= target.viewer.near) & (reach <= target.viewer.far))
     nearest = np.full(rows.size, np.inf)
-    np.minimum.at(nearest, around[hit], depth[hit])
-    first = hit[depth[hit] <= nearest[around[hit]] * (1 + RESOLUTION)]
+    np.minimum.at(nearest, around[hit], distance[hit])
+    first = hit[distance[hit] <= nearest[around[hit]] * (1 + RESOLUTION)]
     order = first[np.lexsort((tests.triangle[first], around[first]))][::-1]
     result[around[order]] = tests.triangle[order]  # the last write of a row is its lowest triangle
     return result

@@ -25,7 +25,7 @@ class Target:
     """The scene as rays from one eye meet it.
 
     Attributes:
-        viewer: near, far, and how depth is measured.
+        viewer: near, far, what they cut, and how depth is measured.
         corners: (V, 3) world minus eye, metres.
         triangles: (T, 3) indices into `corners`.
         plane: (T, 4) normal n (of no particular length) and n·p for points p of the triangle's plane.
@@ -62,8 +62,7 @@ def aim(vertices: FloatArray, triangles: Int32Array, viewer: Viewer, backface_cu
     drawn = np.asarray(normal.any(axis=1))
     if backface_culling:
         drawn &= offset < 0
-    measure = np.sqrt(dot(corners, corners)) if viewer.depth == "radial" else dot(corners, viewer.look)
-    farthest = measure[triangles].max(axis=1)
+    farthest = viewer.reach_of(corners.T)[triangles].max(axis=1)
     # What ends before near begins would only have to be stepped through.
     named = np.flatnonzero(drawn & (farthest >= viewer.near * (1 - 1e-6)))
     plane = np.concatenate((normal, offset[:, None]), axis=1)
@@ -91,6 +90,11 @@ def measure_along(viewer: Viewer, directions: FloatArray) -> FloatArray:
     if viewer.depth == "radial":
         return np.asarray(np.sqrt(dot(directions, directions)))
     return dot(directions, viewer.look)
+
+
+def reach_along(viewer: Viewer, directions: FloatArray) -> FloatArray:
+    """What near and far cut (...,), for each unit of t along `directions` (..., 3)."""
+    return viewer.reach_of(np.moveaxis(directions, -1, 0))
 
 
 def plane_distance(target: Target, triangle: IntArray, directions: FloatArray) -> FloatArray:
@@ -125,7 +129,7 @@ def cast(target: Target, directions: FloatArray, beyond: FloatArray | None = Non
     found = np.full(len(directions), MISS, dtype=np.int64)
     if not target.named.size:
         return found
-    gain = measure_along(target.viewer, directions)
+    gain = reach_along(target.viewer, directions)
     live = np.flatnonzero(gain > 0)
     start = np.zeros(len(directions)) if beyond is None else beyond.copy()
     for _ in range(_MOST_STEPS):
@@ -146,8 +150,8 @@ def cast(target: Target, directions: FloatArray, beyond: FloatArray | None = Non
     return found
 
 
-def _in_range(viewer: Viewer, depth: FloatArray) -> IntArray:
+def _in_range(viewer: Viewer, reach: FloatArray) -> IntArray:
     """0 inside near and far, UNSURE on a limit, −3 before near, 1 beyond far."""
-    verdict = np.where(depth < viewer.near, -3, np.where(depth > viewer.far, 1, 0))
-    on_limit = np.minimum(np.abs(depth - viewer.near) / viewer.near, np.abs(depth - viewer.far) / viewer.far)
+    verdict = np.where(reach < viewer.near, -3, np.where(reach > viewer.far, 1, 0))
+    on_limit = np.minimum(np.abs(reach - viewer.near) / viewer.near, np.abs(reach - viewer.far) / viewer.far)
     return np.where(on_limit <= 1e-6, UNSURE, verdict).astype(np.int64)

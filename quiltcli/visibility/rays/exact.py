@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, cross, dot, segments
-from quiltcli.visibility.rays.embree import Target, measure_along
+from quiltcli.visibility.rays.embree import Target, measure_along, reach_along
 from quiltcli.visibility.rays.pixels import Places
 
 
@@ -53,6 +53,7 @@ class Tests:
         row: (M,) which pixel.
         triangle: (M,).
         depth: (M,) depth of the triangle's plane along the ray, metres.
+        distance: (M,) how far from the eye that is; what is nearer hides what is farther.
         inside: (M,) pixels the centre lies inside the triangle, negative outside; −inf where the
             triangle is out of range or not drawn.
     """
@@ -60,6 +61,7 @@ class Tests:
     row: IntArray
     triangle: IntArray
     depth: FloatArray
+    distance: FloatArray
     inside: FloatArray
 
 
@@ -91,7 +93,9 @@ def intersect(
     with np.errstate(divide="ignore", invalid="ignore"):
         t = dot(e2, cross(-a, e1)) / det
         depth = t * measure_along(target.viewer, ray)
+        distance = t * np.sqrt(dot(ray, ray))
+        reach = t * reach_along(target.viewer, ray)
     viewer = target.viewer
-    usable = (t > 0) & (depth >= viewer.near * (1 - 1e-6)) & (depth <= viewer.far * (1 + 1e-6))
+    usable = (t > 0) & (reach >= viewer.near * (1 - 1e-6)) & (reach <= viewer.far * (1 + 1e-6))
     inside[~(usable & target.drawn[triangle])] = -np.inf
-    return Tests(row, triangle, depth, inside)
+    return Tests(row, triangle, depth, distance, inside)

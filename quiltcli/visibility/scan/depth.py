@@ -1,8 +1,9 @@
 """Near and far: which triangles are cut by them, and which of their fragments remain.
 
-A point at t along the ray d has the depth Z = t·L, where L is −d·z for planar depth, linear in the
-pixel, and |d| for radial depth. A fragment is kept where near ≤ Z ≤ far, that is
-near/t ≤ L ≤ far/t: nothing is divided, and triangles wholly inside the range skip the test.
+A point at t along the ray d reaches t·L, where L is the part of d along the look direction, linear in
+the pixel, where near and far are planes, and |d| where they are distances. A fragment is kept where
+near ≤ t·L ≤ far, that is near/t ≤ L ≤ far/t: nothing is divided, and triangles wholly inside the range
+skip the test. Depth may be measured the other way.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ class DepthRange:
     Attributes:
         near: metres.
         far: metres.
+        by_distance: whether near and far cut by the distance from the eye, not along `look`.
         radial: whether depth is the distance from the eye.
         look: (3,) direction planar depth is measured along.
         rays: (K, 3, 3) block pixels to eye rays.
@@ -30,6 +32,7 @@ class DepthRange:
 
     near: float
     far: float
+    by_distance: bool
     radial: bool
     look: FloatArray
     rays: FloatArray
@@ -59,7 +62,7 @@ class DepthRange:
             inverse: 1/t of the fragments, positive.
         """
         ray = self.directions(block, x, y)
-        if self.radial:
+        if self.by_distance:
             length = np.sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
         else:
             length = self.look[0] * ray[0] + self.look[1] * ray[1] + self.look[2] * ray[2]
@@ -68,24 +71,24 @@ class DepthRange:
 
 
 def triangles_in_range(
-    depth: FloatArray, vertices: FloatArray, triangles: Int32Array, viewer: Viewer
+    reach: FloatArray, vertices: FloatArray, triangles: Int32Array, viewer: Viewer
 ) -> tuple[BoolArray, BoolArray]:
     """Which triangles reach into the depths that are drawn, and which also reach out of them.
 
     Args:
-        depth: (V,) depth of the vertices, metres.
+        reach: (V,) of the vertices, as near and far cut it (`Viewer.reach_of`), metres.
         vertices: (V, 3) world minus eye, metres.
         triangles: (T, 3).
-        viewer: near, far, and how depth is measured.
+        viewer: near, far, and what they cut.
 
     Returns:
         inside (T,) and cut (T,); a triangle that is cut needs its fragments tested.
     """
-    if viewer.depth == "radial":
-        return _radial_range(depth, vertices, triangles, viewer)
-    if depth.size and viewer.near <= depth.min() and depth.max() <= viewer.far:
+    if viewer.by_distance:
+        return _radial_range(reach, vertices, triangles, viewer)
+    if reach.size and viewer.near <= reach.min() and reach.max() <= viewer.far:
         return np.ones(len(triangles), dtype=np.bool_), np.zeros(len(triangles), dtype=np.bool_)
-    nearest, farthest = _least_and_greatest(depth, triangles)
+    nearest, farthest = _least_and_greatest(reach, triangles)
     inside = (farthest >= viewer.near) & (nearest <= viewer.far)
     return inside, inside & ((nearest < viewer.near) | (farthest > viewer.far))
 
