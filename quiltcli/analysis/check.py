@@ -134,7 +134,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     findings.run(load_scene, findings.run(load_scene_file, job.scene))
     if facets is not None and not found:
         viewers = viewers_of(job, job.frames)
-        findings.problems += eye_problems(facets, viewers, job.viewer.source)
+        findings.problems += eye_problems(facets, viewers, job)
 
 
 def _job_alone(path: Path) -> JobFile | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from fractions import Fraction
 from pathlib import Path
 
@@ -15,17 +16,34 @@ from quiltcli.viewer.viewer import Viewer
 
 
 def page_attributes(view: View, fps: Fraction, job_sha: str, version: str) -> dict[str, object]:
-    """Attributes of a page of a view: the first viewer's."""
-    return _attributes(view, view.viewer, fps, job_sha, version)
+    """Attributes of a page of a view: the first viewer's, and of several what they all are."""
+    attributes = _attributes(view, view.viewer, fps, job_sha, version)
+    if view.viewer.name:
+        attributes["quilt:viewers"] = json.dumps([_told(viewer) for viewer in view.viewers])
+    return attributes
 
 
 def viewer_attributes(view: View, facet: int, fps: Fraction, job_sha: str, version: str) -> dict[str, object]:
     """Attributes of an image that shows one facet (1-based id) alone: those of the viewer it belongs to."""
-    return _attributes(view, view.viewer_of(facet), fps, job_sha, version)
+    viewer = view.viewer_of(facet)
+    name = {"quilt:viewer": viewer.name} if viewer.name and viewer.sees(facet) else {}
+    return _attributes(view, viewer, fps, job_sha, version) | name
+
+
+def _told(viewer: Viewer) -> dict[str, object]:
+    """A viewer for programs, in numbers that read back exactly."""
+    places = {"eye": viewer.eye, "look": viewer.look, "up": viewer.up, "head": viewer.head}
+    return {
+        "name": viewer.name,
+        "facets": None if viewer.facets is None else list(viewer.facets),
+        **{name: place.tolist() for name, place in places.items() if place is not None},
+        "near": viewer.near,
+        "far": viewer.far,
+    }
 
 
 def _attributes(view: View, viewer: Viewer, fps: Fraction, job_sha: str, version: str) -> dict[str, object]:
-    return {
+    attributes: dict[str, object] = {
         "framesPerSecond": Fraction(fps),
         "quilt:frame": int(view.frame),
         "quilt:eye": np.asarray(viewer.eye, dtype=np.float32),
@@ -37,6 +55,12 @@ def _attributes(view: View, viewer: Viewer, fps: Fraction, job_sha: str, version
         "quilt:job": job_sha,
         "quilt:version": version,
     }
+    if viewer.head is not None:
+        attributes["quilt:head"] = np.asarray(viewer.head, dtype=np.float32)
+    if view.eye:
+        # As OpenEXR has it for views in files of their own; parts of one file have no `multiView`.
+        attributes |= {"view": view.eye, "multiView": [view.eye]}
+    return attributes
 
 
 def facet_attributes(facet_id: int, facet_from_world: FloatArray) -> dict[str, object]:

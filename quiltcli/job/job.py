@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeAlias
@@ -27,6 +28,7 @@ from quiltcli.job.model import (
     complaint,
     describe,
     either,
+    exactly_one,
 )
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
@@ -37,6 +39,8 @@ COMPRESSIONS = (
     *("pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k"),  # lossy
 )
 CLIPS = ("auto", "planar", "distance")
+STEREO = ("files", "parts")
+_NAME = re.compile(r"[\w-]+")
 UNLIT = ("write", "link", "skip")
 DATA_WINDOWS = ("full", "tight")
 # Decimal rates that stand for fractions in film and television.
@@ -143,6 +147,8 @@ class OutputSpec(Model):
     """Channels of every image."""
     compression: Annotated[str, OneOf(COMPRESSIONS)] = "zip"
     """OpenEXR compression."""
+    stereo: Annotated[str, OneOf(STEREO)] = "files"
+    """Two eyes' images: files of their own, or parts of one file."""
     unlit: Annotated[str, OneOf(UNLIT)] = "write"
     """Images of facets that face away from the viewer: written, hard links to one of their size, or none."""
     data_window: Annotated[str, OneOf(DATA_WINDOWS)] = "full"
@@ -161,11 +167,51 @@ def _twice(channels: Sequence[str]) -> Iterator[Complaint]:
             yield ("channels", i), f"{name!r} is already asked for"
 
 
+def _shared_facets(viewers: Mapping[str, ViewerSpec]) -> Iterator[Complaint]:
+    """What is wrong with how facets are shared out among viewers."""
+    owner: dict[int, str] = {}
+    for name, spec in viewers.items():
+        if not _NAME.fullmatch(name):
+            yield ("viewers", name), "expected a name of letters, digits, - and _"
+        if spec.facets is None:
+            if len(viewers) > 1:
+                words = "missing key (each of several viewers has facets of their own)"
+                yield ("viewers", name, "facets"), words
+            continue
+        taken = [facet for facet in spec.facets if facet in owner]
+        if taken:
+            first = f"facet {taken[0]} belongs to {owner[taken[0]]} already"
+            words = f"{first} (a facet shows one viewer's picture)"
+            yield ("viewers", name, "facets"), words
+        owner |= dict.fromkeys(spec.facets, name)
+    if len({spec.stereo is None for spec in viewers.values()}) > 1:
+        plain = next(name for name, spec in viewers.items() if spec.stereo is None)
+        words = "has one eye where others have two (give all of them stereo, or none)"
+        yield ("viewers", plain), words
+
+
 class JobFile(FileModel):
     """A render job."""
 
+    @property
+    def people(self) -> Mapping[str, ViewerSpec]:
+        """Everybody who looks, by name; the only viewer has none."""
+        if self.viewers is not None:
+            return self.viewers
+        assert self.viewer is not None
+        return {"": self.viewer}
+
+    @property
+    def is_stereo(self) -> bool:
+        """Whether there are images for two eyes."""
+        return any(spec.stereo is not None for spec in self.people.values())
+
     def cross_checks(self) -> Iterator[Complaint]:
-        """The canonical depth lies between a near and a far plane."""
+        """One viewer or several, each facet for one; the canonical depth lies between two planes."""
+        yield from exactly_one(self, "viewer", "viewers")
+        if self.viewer is not None and self.viewer.facets is not None:
+            yield ("viewer", "facets"), "belongs to one of several viewers (expected viewers: {NAME: …})"
+        yield from _shared_facets(self.viewers or {})
         if self.render.clip == "distance" and "zv" in self.output.channels:
             words = "zv lies between a near and a far plane (expected planar or auto), got distance"
             yield ("render", "clip"), words
@@ -188,8 +234,10 @@ class JobFile(FileModel):
         WithJsonSchema({"type": ["number", "string"], "examples": [30, "30000/1001"]}),
     ] = Fraction(30)
     """Frames a second: a number, or a fraction such as 30000/1001."""
-    viewer: ViewerSpec
+    viewer: ViewerSpec | None = None
     """The viewer."""
+    viewers: Annotated[dict[str, ViewerSpec], Field(min_length=1)] | None = None
+    """Several viewers by name, each with facets of their own, instead of `viewer`."""
     render: RenderSpec = RenderSpec()
     """How pixels are made."""
     output: OutputSpec = OutputSpec()

@@ -201,6 +201,37 @@ class PathSpec(Model):
                 yield ("keyframes", i, "look_at" if key.look is None else "look"), words
 
 
+class StereoSpec(Model):
+    """Two eyes."""
+
+    separation: Positive = 0.063
+    """Distance between the eyes, metres."""
+    eye_time: Annotated[str, OneOf(("same", "own"))] = "same"
+    """When the right eye looks: with the left (same), or half a frame later (own), as displays do that show
+    one eye after the other."""
+
+
+def _facets(value: Any) -> Any:
+    if value is None or isinstance(value, tuple):
+        return value
+    if isinstance(value, bool) or not isinstance(value, (str, int)):
+        raise complaint(f"expected facets such as 1-3 or 1,5,7-9, got {describe(value)}")
+    try:
+        ids = parse_frames(str(value))
+    except JobError as error:
+        raise complaint(error.problems[0].message.replace("frame", "facet")) from None
+    if min(ids) < 1:
+        raise complaint(f"facets are counted from 1, got {min(ids)}")
+    return ids
+
+
+FacetIds = Annotated[
+    tuple[int, ...] | None,
+    BeforeValidator(_facets),
+    WithJsonSchema({"type": ["string", "integer"], "examples": ["1-3", "1,5,7-9"]}),
+]
+
+
 class ViewerSpec(Model):
     """The viewer."""
 
@@ -209,7 +240,11 @@ class ViewerSpec(Model):
     far: Positive
     """Farthest depth that is drawn, metres."""
     path: PathSpec
-    """Where the eye is."""
+    """Where the eye is; where there are two, the place between them."""
+    stereo: StereoSpec | None = None
+    """Two eyes; one when absent."""
+    facets: FacetIds = None
+    """Facets that are drawn for this viewer, where there are several."""
 
     def cross_checks(self) -> Iterator[Complaint]:
         """The depth range is not empty."""

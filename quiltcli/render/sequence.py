@@ -140,7 +140,7 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
     stage = set_stage(job)
     views = stage.views(frames)
     viewers = [viewer for view in views for viewer in view.viewers]
-    raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
+    raise_all(ViewerError, eye_problems(stage.facets, viewers, job))
     only = chosen_facets(stage, options.facets)
     out = outputs(stage, options.folder or job.output.directory, job_sha256(job), options.facets)
     if only is not None:
@@ -179,7 +179,7 @@ def render_frames(
             writer.leave(len(sheets) - 1)
             if ready.only is not None:
                 read_quilt(stage, ready.out, view, sheets[turn])
-            now = stage.at(view.frame)
+            now = stage.at(view.time)
             record = draw_view(now, view, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool)
             writer.take(record, view, sheets[turn])
         writer.leave(0)

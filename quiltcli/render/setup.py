@@ -56,7 +56,7 @@ class Stage:
         """The views of some frames; errors as for `viewer.view.views_of`."""
         return views_of(self.job, frames, self.clip)
 
-    def at(self, frame: int) -> Stage:
+    def at(self, frame: float) -> Stage:
         """The stage with its scene as it is in a frame; itself where nothing moves."""
         scene = self.source.scene_at(frame) if self.source else self.scene
         return self if scene is self.scene else replace(self, scene=scene)

@@ -10,8 +10,8 @@ from quiltcli.scene.scene import Scene
 class SceneSource(Protocol):
     """Gives the scene of any frame; the frame number alone decides."""
 
-    def scene_at(self, frame: int) -> Scene:
-        """The scene as it is in a frame.
+    def scene_at(self, frame: float) -> Scene:
+        """The scene as it is in a frame, or at a time between two.
 
         Arrays that are as they were in another frame should be the same objects: what is the same is
         neither copied to workers nor worked out again.

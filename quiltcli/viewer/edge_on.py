@@ -10,19 +10,20 @@ from quiltcli.display import Facets
 from quiltcli.errors import Problem
 from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import dot
+from quiltcli.job import JobFile
 from quiltcli.viewer.viewer import Viewer
 
 _FLAT = 1e-9  # metres
 _MOST_PROBLEMS = 20
 
 
-def eye_problems(facets: Facets, viewers: Iterable[Viewer], source: Source) -> list[Problem]:
+def eye_problems(facets: Facets, viewers: Iterable[Viewer], job: JobFile) -> list[Problem]:
     """A problem for every frame in which the eye lies in the plane of an enabled facet.
 
     Args:
         facets: the display.
-        viewers: the viewer of every frame.
-        source: where the job's `viewer` was written.
+        viewers: everybody who looks, frame by frame.
+        job: their job.
 
     Returns:
         At most 20 problems, in the order of the viewers.
@@ -30,8 +31,12 @@ def eye_problems(facets: Facets, viewers: Iterable[Viewer], source: Source) -> l
     problems: list[Problem] = []
     for viewer in viewers:
         height = dot(viewer.eye - facets.origin, facets.normal)
-        flat = np.flatnonzero(facets.enabled & (np.abs(height) <= _FLAT))
+        mine = facets.enabled & (np.abs(height) <= _FLAT)
+        if viewer.facets is not None:
+            mine &= np.isin(np.arange(1, facets.count + 1), viewer.facets)
+        flat = np.flatnonzero(mine)
         if flat.size:
+            source = job.people[viewer.name].source
             problems.append(_edge_on(facets, viewer.frame, flat.tolist(), source))
         if len(problems) == _MOST_PROBLEMS:
             break

@@ -28,7 +28,7 @@ class Pose:
     blame: tuple[str | int, ...]
 
 
-def keyframe_pose(path: PathSpec, frame: int) -> Pose:
+def keyframe_pose(path: PathSpec, frame: float) -> Pose:
     """Pose between keyframes; before the first and after the last the ends are held."""
     numbered = sorted(enumerate(path.keyframes or ()), key=lambda item: item[1].frame)
     frames = np.array([key.frame for _, key in numbered], dtype=np.float64)
@@ -95,7 +95,7 @@ INTERPOLATIONS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]]
 }
 
 
-def orbit_pose(path: PathSpec, frame: int) -> Pose:
+def orbit_pose(path: PathSpec, frame: float) -> Pose:
     """Pose on a circle: 0° is on the +Z side of the centre, 90° on the +X side."""
     orbit = path.orbit
     assert orbit is not None
@@ -110,7 +110,7 @@ def orbit_pose(path: PathSpec, frame: int) -> Pose:
     return Pose(eye, target - eye, np.asarray(orbit.up, dtype=np.float64), ("orbit",))
 
 
-def _orbit_degrees(orbit: OrbitSpec, frame: int) -> float:
+def _orbit_degrees(orbit: OrbitSpec, frame: float) -> float:
     """Angle of a frame, degrees."""
     passed = frame - orbit.start_frame
     if orbit.frames_per_turn is not None:
@@ -122,7 +122,7 @@ def _orbit_degrees(orbit: OrbitSpec, frame: int) -> float:
     return orbit.start_deg + (orbit.end_deg - orbit.start_deg) * share
 
 
-def csv_pose(path: PathSpec, frame: int) -> Pose:
+def csv_pose(path: PathSpec, frame: float) -> Pose:
     """Pose of a recorded frame; a frame that was not recorded is an error, unless gaps may be filled."""
     spec = path.csv
     assert spec is not None
@@ -150,7 +150,7 @@ def _given_aim(spec: CsvSpec, eye: FloatArray, blame: Source) -> FloatArray:
     return np.asarray(spec.look_at, dtype=np.float64) - eye
 
 
-def _track_row(spec: CsvSpec, track: Track, frame: int, blame: Source) -> FloatArray:
+def _track_row(spec: CsvSpec, track: Track, frame: float, blame: Source) -> FloatArray:
     """Numbers of a frame, from its row or from between two rows."""
     at = int(np.searchsorted(track.frames, frame))
     if at < track.frames.size and track.frames[at] == frame:
@@ -158,16 +158,16 @@ def _track_row(spec: CsvSpec, track: Track, frame: int, blame: Source) -> FloatA
         return row
     first, last = int(track.frames[0]), int(track.frames[-1])
     if not first < frame < last:
-        words = f"frame {frame} is not in {spec.file} (it holds frames {first} to {last})"
+        words = f"frame {frame:g} is not in {spec.file} (it holds frames {first} to {last})"
         raise ViewerError(blame.problem((), words))
     if not spec.fill:
         before, after = int(track.frames[at - 1]), int(track.frames[at])
-        words = f"frame {frame} is missing between {before} and {after} (add it, or set fill: true)"
+        words = f"frame {frame:g} is missing between {before} and {after} (add it, or set fill: true)"
         raise ViewerError(track.problem(at, words))
     return linear(track.frames.astype(np.float64), track.values, float(frame))
 
 
-PATHS: dict[str, Callable[[PathSpec, int], Pose]] = {
+PATHS: dict[str, Callable[[PathSpec, float], Pose]] = {
     "keyframes": keyframe_pose,
     "orbit": orbit_pose,
     "csv": csv_pose,

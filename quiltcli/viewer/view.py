@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from quiltcli.errors import Problem, QuiltError, ViewerError, raise_all
-from quiltcli.job import JobFile
+from quiltcli.job import JobFile, ViewerSpec
 from quiltcli.viewer.viewer import Viewer, viewer_at
+
+EYES = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -18,11 +20,13 @@ class View:
         frame: frame number.
         eye: `left` or `right`, empty where there is one eye; it stands in the files' names.
         viewers: whoever looks, each at facets of their own.
+        time: when they look, in frames: later than `frame` where the right eye looks later.
     """
 
     frame: int
     eye: str
     viewers: tuple[Viewer, ...]
+    time: float
 
     @property
     def viewer(self) -> Viewer:
@@ -31,7 +35,7 @@ class View:
 
     def viewer_of(self, facet: int) -> Viewer:
         """The viewer a facet (1-based id) belongs to; the first where it belongs to none."""
-        theirs = (viewer for viewer in self.viewers if viewer.facets is None or facet in viewer.facets)
+        theirs = (viewer for viewer in self.viewers if viewer.sees(facet))
         return next(theirs, self.viewer)
 
     @property
@@ -56,8 +60,36 @@ def views_at(job: JobFile, frame: int, clip: str | None = None) -> tuple[View, .
     Raises:
         ViewerError: a path gives no usable pose at this frame.
     """
-    viewer = replace(viewer_at(job.viewer, frame, job.render.depth), clip=clip)
-    return (View(frame, "", (viewer,)),)
+    if not job.is_stereo:
+        heads = (_head(job, name, frame, clip) for name in job.people)
+        return (View(frame, "", tuple(heads), frame),)
+    views = []
+    for eye in EYES:
+        late = eye == "right" and any(_eye_time(spec) == "own" for spec in job.people.values())
+        viewers = (_one_eye(job, name, frame, eye, clip) for name in job.people)
+        views.append(View(frame, eye, tuple(viewers), frame + 0.5 * late))
+    return tuple(views)
+
+
+def _head(job: JobFile, name: str, time: float, clip: str | None) -> Viewer:
+    """One viewer at a time in frames, with one eye at the head's place."""
+    spec = job.people[name]
+    head = viewer_at(spec, time, job.render.depth)
+    return replace(head, clip=clip, name=name, facets=spec.facets)
+
+
+def _one_eye(job: JobFile, name: str, frame: int, eye: str, clip: str | None) -> Viewer:
+    """One eye of a viewer: half the separation from the head's place, along the head's right axis."""
+    spec = job.people[name]
+    assert spec.stereo is not None
+    head = _head(job, name, frame + 0.5 * (eye == "right" and _eye_time(spec) == "own"), clip)
+    right = head.camera_from_world[0]
+    side = spec.stereo.separation / 2 * (1 if eye == "right" else -1)
+    return replace(head, frame=frame, eye=head.eye + side * right, head=head.eye)
+
+
+def _eye_time(spec: ViewerSpec) -> str:
+    return spec.stereo.eye_time if spec.stereo else "same"
 
 
 def views_of(job: JobFile, frames: Iterable[int], clip: str | None = None) -> list[View]:

@@ -58,6 +58,10 @@ class Viewer:
         """
         return self._measured(position, by_distance=self.depth == "radial")
 
+    def sees(self, facet: int) -> bool:
+        """Whether a facet (1-based id) is theirs."""
+        return self.facets is None or facet in self.facets
+
     @property
     def by_distance(self) -> bool:
         """Whether near and far cut by the distance from the eye."""
@@ -74,12 +78,12 @@ class Viewer:
         return np.asarray(x * self.look[0] + y * self.look[1] + z * self.look[2])
 
 
-def viewer_at(spec: ViewerSpec, frame: int, depth: str) -> Viewer:
-    """The viewer of one frame.
+def viewer_at(spec: ViewerSpec, frame: float, depth: str) -> Viewer:
+    """The viewer of one frame, or at a time between two.
 
     Args:
         spec: the job's `viewer`.
-        frame: frame number; nothing else enters the pose.
+        frame: frame number, or a time in frames; nothing else enters the pose.
         depth: the job's `render.depth`.
 
     Raises:
@@ -95,19 +99,19 @@ def viewer_at(spec: ViewerSpec, frame: int, depth: str) -> Viewer:
             else "is where it looks at"
         )
         raise ViewerError(
-            blame.problem((), f"at frame {frame} the viewer {why}: there is no direction of view")
+            blame.problem((), f"at frame {frame:g} the viewer {why}: there is no direction of view")
         )
     look = pose.look / distance
     right = cross(look, normalized(pose.up))
     if not float(np.linalg.norm(right)) > 1e-6:
         raise ViewerError(
-            blame.problem((), f"at frame {frame} the viewer looks along up (turn up elsewhere)")
+            blame.problem((), f"at frame {frame:g} the viewer looks along up (turn up elsewhere)")
         )
     up = normalized(cross(normalized(right), look))
-    return Viewer(frame, pose.eye, look, up, spec.near, spec.far, depth)
+    return Viewer(int(frame), pose.eye, look, up, spec.near, spec.far, depth)
 
 
-def _pose(path: PathSpec, frame: int) -> Pose:
+def _pose(path: PathSpec, frame: float) -> Pose:
     """Pose by the kind of path that was given."""
     for kind, pose_of in PATHS.items():
         if getattr(path, kind) is not None:

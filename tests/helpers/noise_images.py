@@ -31,4 +31,5 @@ def noise(height=40, width=50, seed=1):
 
 
 def provenance():
-    return page_attributes(View(VIEWER.frame, "", (VIEWER,)), Fraction(30000, 1001), "ab" * 32, "0.1.0")
+    view = View(VIEWER.frame, "", (VIEWER,), VIEWER.frame)
+    return page_attributes(view, Fraction(30000, 1001), "ab" * 32, "0.1.0")

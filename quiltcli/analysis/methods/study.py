@@ -124,7 +124,7 @@ def compare(job: JobFile, options: CompareOptions | None = None) -> Study:
     viewers_of(job, [frame])
     stage = set_stage(with_variant(job, REFERENCE)).at(frame)
     viewers = stage.views([frame])[0].viewers
-    raise_all(ViewerError, eye_problems(stage.facets, viewers, job.viewer.source))
+    raise_all(ViewerError, eye_problems(stage.facets, viewers, job))
     variants = (REFERENCE, *(v for v in dict.fromkeys(options.variants) if v != REFERENCE))
     threads = options.threads or default_threads()
     options.begin(REFERENCE.name)

@@ -114,7 +114,7 @@ def simulate(
     stage = set_stage(with_channels(job, ("rgba",)))
     threads = options.threads or default_threads()
     for view in stage.views(frames):
-        now, viewer = stage.at(view.frame), view.viewer
+        now, viewer = stage.at(view.time), view.viewer
         shown, source = shown_images(now, view, job.output.directory, sha, threads)
         yield replace(take_picture(now, viewer, shown, options), source=source)
 

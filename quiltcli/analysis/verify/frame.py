@@ -128,7 +128,7 @@ def verify(job: JobFile, options: VerifyOptions | None = None) -> tuple[Verdict,
     views_of(job, [frame])  # what is wrong with the path is said before anything is loaded
     stage = set_stage(job).at(frame)
     [view] = stage.views([frame])
-    raise_all(ViewerError, eye_problems(stage.facets, view.viewers, job.viewer.source))
+    raise_all(ViewerError, eye_problems(stage.facets, view.viewers, job))
     threads = options.threads or default_threads()
     folder = options.folder or job.output.directory
     images = find_images(stage, view, folder, threads, options.redraw)
