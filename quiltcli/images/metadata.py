@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import OutputError
+from quiltcli.formats.exr.digest import is_sealed
 from quiltcli.formats.exr.image import read_header
 from quiltcli.geometry import FloatArray
 from quiltcli.viewer.view import View
@@ -70,10 +71,9 @@ def facet_attributes(facet_id: int, facet_from_world: FloatArray) -> dict[str, o
 
 
 def is_complete(path: Path, job_sha: str, frame: int) -> bool:
-    """Whether `path` is a whole image of this `frame` made by the job with that hash.
-
-    The structure of the file is checked to its last byte; no pixel is decoded.
-    """
+    """Whether `path` is an image of this `frame` made by the job with that hash, and no bit of it is wrong."""
+    if not is_sealed(path):
+        return False
     try:
         attributes = read_header(path).attributes
     except OutputError:

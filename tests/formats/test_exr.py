@@ -9,9 +9,10 @@ import OpenEXR
 import pytest
 
 from quiltcli.errors import OutputError
+from quiltcli.formats import whole
 from quiltcli.formats.exr import image as exr
 from quiltcli.formats.exr.image import Image, read_exr, read_header, write_exr
-from quiltcli.formats.whole import make_folder, temporary_path, write_text
+from quiltcli.formats.whole import make_folder, write_text
 from tests.helpers.noise_images import noise, provenance
 
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256", "lj2k")
@@ -237,9 +238,14 @@ def small_disk():
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_a_full_disk(tmp_path):
+def test_a_full_disk(tmp_path, monkeypatch):
+    def full(path):
+        place = path.with_name("full")
+        place.symlink_to("/dev/full")
+        return place, os.open(place, os.O_RDWR)
+
     path = tmp_path / "a.exr"
-    temporary_path(path).symlink_to("/dev/full")
+    monkeypatch.setattr(whole, "new_file_beside", full)
     with pytest.raises(OutputError) as caught:
         write_exr(path, noise(200, 300), {})
     assert f"{path}: cannot be written: No space left on device" == said(caught)
@@ -267,7 +273,7 @@ def test_a_disk_that_fills_with_the_last_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr(OpenEXR.File, "write", lossy)
     with pytest.raises(OutputError) as caught:
         write_exr(path, {"R": np.ones((4, 4), np.float16)}, {}, "none")
-    expected = f"{path}: cannot be written: what reached the disk is truncated: 401 of 402 bytes"
+    expected = f"{path}: cannot be written: what reached the disk is truncated: 489 of 490 bytes"
     assert expected == said(caught)
     assert not list(tmp_path.iterdir())
 
@@ -325,13 +331,13 @@ def test_a_file_of_another_kind(tmp_path, content, expected):
 def test_every_truncation_is_found(tmp_path):
     path = tmp_path / "a.exr"
     write_exr(path, noise(), provenance(), "zips")
-    whole = path.read_bytes()
-    for size in [*range(0, 1200, 7), *range(1200, len(whole), 97), len(whole) - 1]:
-        path.write_bytes(whole[:size])
+    good = path.read_bytes()
+    for size in [*range(0, 1200, 7), *range(1200, len(good), 97), len(good) - 1]:
+        path.write_bytes(good[:size])
         assert exr.exr_fault(path).startswith(("is truncated: ", "is empty")), size
     with pytest.raises(OutputError) as caught:
         read_exr(path)
-    assert f"{path}: is truncated: {len(whole) - 1} of {len(whole)} bytes" == said(caught)
+    assert f"{path}: is truncated: {len(good) - 1} of {len(good)} bytes" == said(caught)
 
 
 def test_a_chunk_table_never_filled_in(tmp_path):
@@ -375,9 +381,9 @@ def test_many_parts(tmp_path, tiled):
     with pytest.raises(OutputError) as caught:
         read_exr(path)
     assert f"{path}: has 3 parts, expected an image of one part" == said(caught)
-    whole = path.read_bytes()
-    for size in range(40, len(whole), 211):
-        path.write_bytes(whole[:size])
+    good = path.read_bytes()
+    for size in range(40, len(good), 211):
+        path.write_bytes(good[:size])
         assert exr.exr_fault(path).startswith("is truncated: "), size
 
 

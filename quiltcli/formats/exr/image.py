@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.exr.check import exr_fault
+from quiltcli.formats.exr.digest import ATTRIBUTE, BLANK, seal
 from quiltcli.formats.whole import whole_file, write_problem
 
 Channel: TypeAlias = NDArray[Any]
@@ -26,6 +27,7 @@ _PIXEL_TYPES = (np.dtype(np.float16), np.dtype(np.float32), np.dtype(np.uint32))
 # What the library derives from the pixels and from `write_exr`'s own arguments.
 _WINDOWS = {"dataWindow", "displayWindow"}
 _STRUCTURE = _WINDOWS | {
+    ATTRIBUTE,
     "channels",
     "chunkCount",
     "compression",
@@ -109,6 +111,7 @@ def write_exr(
     header: dict[str, Any] = {name: _attribute(path, name, value) for name, value in attributes.items()}
     header["compression"] = compression_constant(compression)
     header["type"] = OpenEXR.scanlineimage
+    header[ATTRIBUTE] = BLANK
     if data_window is not None:
         header["dataWindow"] = data_window
     if display_window is not None or data_window is not None:
@@ -122,6 +125,7 @@ def write_exr(
         # The library's stream is flushed when it is destroyed, where a full disk goes unreported.
         if fault := exr_fault(temporary):
             raise OutputError(Problem(f"cannot be written: what reached the disk {fault}", file=str(path)))
+        seal(temporary)
 
 
 def _pixels(path: Path, channels: Mapping[str, Channel]) -> dict[str, Channel]:
