@@ -71,7 +71,7 @@ def facet_attributes(facet_id: int, facet_from_world: FloatArray) -> dict[str, o
 
 
 def is_complete(path: Path, job_sha: str, frame: int) -> bool:
-    """Whether `path` is an image of this `frame` made by the job with that hash, and no bit of it is wrong."""
+    """Whether `path` is an image of this `frame` by the job with that hash, and no bit of it wrong."""
     if not is_sealed(path):
         return False
     try:
