@@ -15,6 +15,7 @@ from quiltcli.cli.printing import print_aligned
 @click.command()
 @click.argument("job", type=PATH)
 @click.option("-f", "--frame", type=int, help="The frame; the job's first by default.")
+@click.option("--eye", type=click.Choice(("left", "right")), help="One eye of two; both by default.")
 @click.option("-o", "--output", type=PATH, help="Folder of the images, instead of the job's.")
 @click.option("--redraw", is_flag=True, help="Draw the frame in memory even if its images exist.")
 @click.option("--all", "everything", is_flag=True, help="Look at every pixel, not a sample.")
@@ -26,6 +27,7 @@ from quiltcli.cli.printing import print_aligned
 def verify(
     job: Path,
     frame: int | None,
+    eye: str | None,
     output: Path | None,
     redraw: bool,
     everything: bool,
@@ -41,27 +43,42 @@ def verify(
     from quiltcli.analysis.verify.picture import write_picture
     from quiltcli.job import load_job
 
-    options = VerifyOptions(frame, everything, pixels or SAMPLE, output, redraw, threads or 0)
-    verdict, stage, images = verify_frame(load_job(job, sets), options)
-    _print_verdict(verdict, as_json)
-    if picture is not None:
-        write_picture(picture, stage.layout, images, verdict.faults)
-    if not verdict.passed:
+    options = VerifyOptions(frame, everything, pixels or SAMPLE, output, redraw, threads or 0, eye or "")
+    verdicts = []
+    for found in verify_frame(load_job(job, sets), options):
+        verdicts.append(found.verdict)
+        if as_json != Path("-"):
+            _print_verdict(found.verdict)
+        if picture is not None:
+            who = filter(None, (picture.stem, found.verdict.viewer, found.verdict.eye))
+            path = picture.with_stem("_".join(who))
+            write_picture(path, found.stage.layout, found.images, found.verdict.faults)
+    if as_json is not None:
+        _write_json(verdicts, as_json)
+    if not all(verdict.passed for verdict in verdicts):
         sys.exit(1)
 
 
-def _print_verdict(verdict: Any, as_json: Path | None) -> None:
-    """The verdict as a table on stdout, as JSON, or both."""
+def _write_json(verdicts: list[Any], path: Path) -> None:
+    """One verdict as it is, several in a list under `views`."""
     import json
 
-    from quiltcli.analysis.verify import COLUMNS, verdict_rows
     from quiltcli.formats.whole import write_text
 
-    text = json.dumps(verdict.as_json(), indent=2, allow_nan=False)
-    if as_json == Path("-"):
+    told = [verdict.as_json() for verdict in verdicts]
+    passed = all(verdict.passed for verdict in verdicts)
+    whole = told[0] if len(told) == 1 else {"quilt_verify": 1, "passed": passed, "views": told}
+    text = json.dumps(whole, indent=2, allow_nan=False)
+    if path == Path("-"):
         click.echo(text)
-        return
-    if as_json is not None:
-        write_text(as_json, text + "\n")
+    else:
+        write_text(path, text + "\n")
+
+
+def _print_verdict(verdict: Any) -> None:
+    """The verdict as a table on stdout."""
+    from quiltcli.analysis.verify import COLUMNS, verdict_rows
+
     print_aligned(COLUMNS, verdict_rows(verdict))
-    click.echo(f"frame {verdict.frame}, {verdict.images}: {verdict.words}")
+    who = "".join(f", {name}" for name in (verdict.viewer, verdict.eye and f"{verdict.eye} eye") if name)
+    click.echo(f"frame {verdict.frame}{who}, {verdict.images}: {verdict.words}")

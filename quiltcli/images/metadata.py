@@ -60,7 +60,7 @@ def _attributes(view: View, viewer: Viewer, fps: Fraction, job_sha: str, version
         attributes["quilt:head"] = np.asarray(viewer.head, dtype=np.float32)
     if view.eye:
         # As OpenEXR has it for views in files of their own; parts of one file have no `multiView`.
-        attributes |= {"view": view.eye, "multiView": [view.eye]}
+        attributes |= {"view": view.eye} | ({} if view.in_parts else {"multiView": [view.eye]})
     return attributes
 
 

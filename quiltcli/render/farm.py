@@ -33,7 +33,7 @@ from quiltcli.render.sequence import (
     render_frames,
 )
 from quiltcli.render.setup import Stage, set_stage
-from quiltcli.viewer.view import View
+from quiltcli.viewer.view import View, by_file
 
 _RETRIES = 2
 _SECONDS_TO_CONNECT = 10
@@ -42,19 +42,24 @@ _loading = threading.Lock()
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker must know of a view.
+    """What a worker must know of what it draws.
 
     Attributes:
         job_file: the resolved job in the output folder.
         job_sha: its hash; a worker that finds another draws nothing.
-        view: what is drawn.
+        views: what is drawn: views that share their files.
         options: the command line's, with an absolute folder.
     """
 
     job_file: Path
     job_sha: str
-    view: View
+    views: tuple[View, ...]
     options: RenderOptions
+
+    @property
+    def name(self) -> str:
+        """What it draws, in words."""
+        return " and ".join(view.name for view in self.views)
 
 
 def render_on(
@@ -90,7 +95,7 @@ def render_on(
     out = ready.out
     with _connected(distributed, address) as client:
         write_settings(ready.stage, out)
-        tasks = [Task(folder / "job.yaml", out.job_sha, view, options) for view in ready.views]
+        tasks = [Task(folder / "job.yaml", out.job_sha, views, options) for views in by_file(ready.views)]
         records = _collect(distributed, client, tasks, listener)
         if records:
             # Once more from here: workers on a file system without locks may have lost some.
@@ -131,18 +136,17 @@ def _collect(distributed: Any, client: Any, tasks: Sequence[Task], listener: Lis
     """
     run = uuid.uuid4().hex[:12]  # the same job may be sent twice, with other options
     how = {"retries": _RETRIES, "pure": False}
-    waiting = {
-        client.submit(render_task, task, key=f"quilt-{run}-{task.view.name}", **how): task for task in tasks
-    }
+    keys = {task.name: f"quilt-{run}-{task.name}" for task in tasks}
+    waiting = {client.submit(render_task, task, key=keys[task.name], **how): task for task in tasks}
     records: list[FrameRecord] = []
     problems: list[Problem] = []
     with stop_between_frames() as request:
         try:
             for future in distributed.as_completed(list(waiting), loop=client.loop):
-                name = waiting.pop(future).view.name
-                record = _result(future, name, problems, listener.say)
+                name = waiting.pop(future).name
+                drawn = _result(future, name, problems, listener.say)
                 future.release()
-                if record is not None:
+                for record in drawn:
                     records.append(record)
                     listener.frame_done(record)
                 request.check()
@@ -153,24 +157,22 @@ def _collect(distributed: Any, client: Any, tasks: Sequence[Task], listener: Lis
     return sorted(records, key=lambda record: (record.frame, record.eye))
 
 
-def _result(
-    future: Any, name: str, problems: list[Problem], say: Callable[[str], None]
-) -> FrameRecord | None:
-    """The record of a finished frame; a failure is told now and noted for the end."""
+def _result(future: Any, name: str, problems: list[Problem], say: Callable[[str], None]) -> list[FrameRecord]:
+    """The records of a finished task; a failure is told now and noted for the end."""
     try:
-        record: FrameRecord | None = future.result()
+        records: list[FrameRecord] | None = future.result()
     except Exception as error:  # whatever befell the worker
         what = str(error) if isinstance(error, QuiltError) else f"{type(error).__name__}: {error}"
         problems.append(Problem(f"frame {name} failed: {' '.join(what.split())}"))
         say(problems[-1].message)
-        return None
-    if record is None:
+        return []
+    if records is None:
         say(f"frame {name} is complete already")
-    return record
+    return records or []
 
 
-def render_task(task: Task) -> FrameRecord | None:
-    """Draw and write one frame, on a worker; None when an earlier run of the task has done so.
+def render_task(task: Task) -> list[FrameRecord] | None:
+    """Draw and write the views of a task, on a worker; None when an earlier run of the task has done so.
 
     Raises:
         QuiltError: the job has changed, or a file cannot be written.
@@ -180,11 +182,14 @@ def render_task(task: Task) -> FrameRecord | None:
         stage = _stage(task.job_file, task.job_sha)
     only = chosen_facets(stage, options.facets)
     out = outputs(stage, task.job_file.parent, task.job_sha, options.facets)
-    if not options.overwrite and only is None and view_is_complete(stage, out, task.view):
+    if (
+        not options.overwrite
+        and only is None
+        and all(view_is_complete(stage, out, view) for view in task.views)
+    ):
         return None
-    ready = Prepared(stage, out, (task.view,), only)
-    [record] = render_frames(ready, options.threads or default_threads(), Listener())
-    return record
+    ready = Prepared(stage, out, task.views, only)
+    return render_frames(ready, options.threads or default_threads(), Listener())
 
 
 @lru_cache(maxsize=1)

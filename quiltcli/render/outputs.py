@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from quiltcli import __version__
 from quiltcli.display import lit_facets
 from quiltcli.errors import OutputError, Problem, raise_all
-from quiltcli.formats.exr.image import Channel, read_exr, read_header, write_exr
+from quiltcli.formats.exr.image import Channel, Image, read_exr, read_header, write_images
 from quiltcli.formats.whole import link_whole, make_folder, remove_file, write_text
 from quiltcli.geometry import BoolArray, IntArray, facet_from_world
 from quiltcli.images.facets import facet_image, page_of
@@ -26,6 +26,8 @@ from quiltcli.render.buffers import Buffers
 from quiltcli.render.report import Clock
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.view import View
+
+Attributes: TypeAlias = dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ def outputs(stage: Stage, folder: Path, job_sha: str, facet_ids: Iterable[int] |
 def view_files(stage: Stage, out: Outputs, view: View) -> list[Path]:
     """Every image of one view."""
     job = stage.job.output
-    pages = [quilt_path(out.folder, page + 1, *view.key) for page in range(len(stage.layout.pages))]
-    facets = [facet_path(out.folder, int(stage.layout.facet[row]), *view.key) for row in out.rows]
+    pages = [quilt_path(out.folder, page + 1, *view.file_key) for page in range(len(stage.layout.pages))]
+    facets = [facet_path(out.folder, int(stage.layout.facet[row]), *view.file_key) for row in out.rows]
     return pages * job.quilts + facets * job.facets
 
 
@@ -72,7 +74,7 @@ def _skipped_files(stage: Stage, out: Outputs, view: View) -> Iterator[Path]:
     """Images of a view that are not to be written, for their facets are not lit."""
     if stage.job.output.facets and stage.job.output.unlit == "skip":
         for row in out.rows[~view_lit(stage, view)[out.rows]]:
-            yield facet_path(out.folder, int(stage.layout.facet[row]), *view.key)
+            yield facet_path(out.folder, int(stage.layout.facet[row]), *view.file_key)
 
 
 def view_lit(stage: Stage, view: View) -> BoolArray:
@@ -104,8 +106,16 @@ def write_settings(stage: Stage, out: Outputs) -> None:
     write_text(out.folder / "job.yaml", dump_job(stage.job, out.folder))
 
 
-def write_view(stage: Stage, out: Outputs, view: View, buffers: Buffers, threads: int) -> dict[str, float]:
-    """Write the images of one view, several files at a time.
+@dataclass(frozen=True)
+class Drawn:
+    """A view and its pixels."""
+
+    view: View
+    buffers: Buffers
+
+
+def write_views(stage: Stage, out: Outputs, drawn: Sequence[Drawn], threads: int) -> dict[str, float]:
+    """Write the images of views that share their files, several files at a time.
 
     Returns:
         Seconds by what was done, those of all threads together.
@@ -115,37 +125,42 @@ def write_view(stage: Stage, out: Outputs, view: View, buffers: Buffers, threads
     """
     total: dict[str, float] = {}
     with ThreadPoolExecutor(threads) as pool:
-        work = _work(stage, out, view, buffers)
+        work = _work(stage, out, drawn)
         for each in [pool.submit(*task) for task in work]:
             for name, seconds in each.result().items():
                 total[name] = total.get(name, 0.0) + seconds
     return total
 
 
-def _work(stage: Stage, out: Outputs, view: View, buffers: Buffers) -> Iterator[tuple[Any, ...]]:
-    """What there is to do for one view: functions that give seconds, and their arguments."""
+def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[Any, ...]]:
+    """What there is to do for these views: functions that give seconds, and their arguments."""
     how, layout = stage.job.output, stage.layout
-    attributes = page_attributes(view, stage.job.fps, out.job_sha, __version__)
+    view = drawn[0].view
+    told = (stage.job.fps, out.job_sha, __version__)
     if how.quilts:
         for page in range(len(layout.pages)):
-            path = quilt_path(out.folder, page + 1, *view.key)
-            yield _write_page, stage, path, page, buffers, attributes | {"quilt:page": page + 1}
+            path = quilt_path(out.folder, page + 1, *view.file_key)
+            own = [page_attributes(one.view, *told) | {"quilt:page": page + 1} for one in drawn]
+            yield _write_page, stage, path, page, drawn, own
     if not how.facets:
         return
     maps = facet_from_world(layout.origin, layout.du, layout.dv)
-    apart = ~view_lit(stage, view)[out.rows] & (how.unlit != "write")
+    lit = np.logical_or.reduce([view_lit(stage, one.view) for one in drawn])
+    apart = ~lit[out.rows] & (how.unlit != "write")
     for row in out.rows[~apart].tolist():
         facet = int(layout.facet[row])
-        own = viewer_attributes(view, facet, stage.job.fps, out.job_sha, __version__)
-        path = facet_path(out.folder, facet, *view.key)
-        yield _write_facet, stage, path, row, buffers, own | facet_attributes(facet, maps[row])
+        where = facet_attributes(facet, maps[row])
+        own = [viewer_attributes(one.view, facet, *told) | where for one in drawn]
+        path = facet_path(out.folder, facet, *view.file_key)
+        yield _write_facet, stage, path, row, drawn, own
     if apart.any():
         for rows in _by_size(layout, out.rows[apart]):
-            paths = [facet_path(out.folder, int(layout.facet[row]), *view.key) for row in rows]
+            paths = [facet_path(out.folder, int(layout.facet[row]), *view.file_key) for row in rows]
             if how.unlit == "skip":
                 yield _remove, paths
             else:
-                yield _write_links, stage, rows[0], buffers, attributes, paths
+                own = [page_attributes(one.view, *told) for one in drawn]
+                yield _write_links, stage, rows[0], drawn, own, paths
 
 
 def _by_size(layout: Layout, rows: IntArray) -> Iterator[list[int]]:
@@ -156,34 +171,36 @@ def _by_size(layout: Layout, rows: IntArray) -> Iterator[list[int]]:
 
 
 def _write_page(
-    stage: Stage, path: Path, page: int, buffers: Buffers, attributes: dict[str, object]
+    stage: Stage, path: Path, page: int, drawn: Sequence[Drawn], attributes: Sequence[Attributes]
 ) -> dict[str, float]:
     """Write one page of the quilt."""
     clock = Clock()
-    pixels = {name: page_of(flat, stage.layout, page) for name, flat in buffers.items()}
-    _write(stage, path, pixels, attributes, clock)
+    pixels = [
+        {name: page_of(flat, stage.layout, page) for name, flat in one.buffers.items()} for one in drawn
+    ]
+    _write(stage, path, drawn, pixels, attributes, clock)
     return clock.seconds
 
 
 def _write_facet(
-    stage: Stage, path: Path, row: int, buffers: Buffers, attributes: dict[str, object]
+    stage: Stage, path: Path, row: int, drawn: Sequence[Drawn], attributes: Sequence[Attributes]
 ) -> dict[str, float]:
     """Write the image of one facet."""
     clock = Clock()
     with clock.stage("cut"):
-        pixels = facet_image(buffers, stage.layout, row, stage.owners)
-    _write(stage, path, pixels, attributes, clock)
+        pixels = [facet_image(one.buffers, stage.layout, row, stage.owners) for one in drawn]
+    _write(stage, path, drawn, pixels, attributes, clock)
     return clock.seconds
 
 
 def _write_links(
-    stage: Stage, row: int, buffers: Buffers, attributes: dict[str, object], paths: list[Path]
+    stage: Stage, row: int, drawn: Sequence[Drawn], attributes: Sequence[Attributes], paths: list[Path]
 ) -> dict[str, float]:
     """Write one image for facets of one size that show nothing, and link it to the names of them all."""
     clock = Clock()
     with clock.stage("cut"):
-        pixels = facet_image(buffers, stage.layout, row, stage.owners)
-    _write(stage, paths[0], pixels, attributes, clock)
+        pixels = [facet_image(one.buffers, stage.layout, row, stage.owners) for one in drawn]
+    _write(stage, paths[0], drawn, pixels, attributes, clock)
     with clock.stage("link"):
         for path in paths[1:]:
             link_whole(paths[0], path)
@@ -200,18 +217,26 @@ def _remove(paths: list[Path]) -> dict[str, float]:
 
 
 def _write(
-    stage: Stage, path: Path, pixels: dict[str, Channel], attributes: dict[str, object], clock: Clock
+    stage: Stage,
+    path: Path,
+    drawn: Sequence[Drawn],
+    pixels: Sequence[dict[str, Channel]],
+    attributes: Sequence[Attributes],
+    clock: Clock,
 ) -> None:
-    """Write one image as the job wants it."""
+    """Write one image, or one for each view, as the job wants it."""
     how = stage.job.output
-    height, width = next(iter(pixels.values())).shape
-    frame = window = (0, 0), (width - 1, height - 1)
-    if how.data_window == "tight":
-        with clock.stage("tighten"):
-            window = tight_window(pixels)
-            pixels = cropped(pixels, window)
+    images = []
+    for one, channels, own in zip(drawn, pixels, attributes, strict=True):
+        height, width = next(iter(channels.values())).shape
+        frame = window = (0, 0), (width - 1, height - 1)
+        if how.data_window == "tight":
+            with clock.stage("tighten"):
+                window = tight_window(channels)
+                channels = cropped(channels, window)
+        images.append(Image(channels, own, how.compression, window, frame, one.view.part))
     with clock.stage("compress and store"):
-        write_exr(path, pixels, attributes, how.compression, data_window=window, display_window=frame)
+        write_images(path, images)
 
 
 def merge_problems(stage: Stage, out: Outputs, views: Iterable[View]) -> list[Problem]:
@@ -227,8 +252,8 @@ def read_quilt(stage: Stage, out: Outputs, view: View, buffers: Buffers) -> None
     """
     raise_all(OutputError, merge_problems(stage, out, [view]))
     for page in range(len(stage.layout.pages)):
-        path = quilt_path(out.folder, page + 1, *view.key)
-        image = read_exr(path)
+        path = quilt_path(out.folder, page + 1, *view.file_key)
+        image = read_exr(path, view.part)
         if missing := sorted(set(buffers) - set(image.channels)):
             raise OutputError(Problem(f"lacks the channels {', '.join(missing)}", str(path)))
         channels = whole_frame(image)
@@ -239,7 +264,7 @@ def read_quilt(stage: Stage, out: Outputs, view: View, buffers: Buffers) -> None
 def _pages_on_disk(stage: Stage, out: Outputs, view: View) -> Iterator[tuple[int, Problem | None]]:
     """Every page of the view's quilt, with what is wrong with its file; no pixel is read."""
     for page, (width, height) in enumerate(stage.layout.pages.tolist()):
-        path = quilt_path(out.folder, page + 1, *view.key)
+        path = quilt_path(out.folder, page + 1, *view.file_key)
         if not path.exists():
             yield (
                 page,

@@ -3,7 +3,7 @@
 job → display, layout, scene            once (`setup.set_stage`)
 frame → views                           a function of the frame number (`viewer.view`)
     bin, warp, rasterize, shade         `frame.draw_frame`, or another of `methods`
-    unmap, write                        `outputs.write_view`
+    unmap, write                        `outputs.write_views`
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, rais
 from quiltcli.formats.exr.image import use_threads
 from quiltcli.geometry import BoolArray
 from quiltcli.job import JobFile, job_sha256
-from quiltcli.render.buffers import Buffers, new_buffers
+from quiltcli.render.buffers import new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.interrupt import stop_between_frames
 from quiltcli.render.methods import draw_view
 from quiltcli.render.notices import stage_warnings
 from quiltcli.render.outputs import (
+    Drawn,
     Outputs,
     merge_problems,
     outputs,
@@ -37,13 +38,13 @@ from quiltcli.render.outputs import (
     refuse_to_overwrite,
     view_is_complete,
     write_settings,
-    write_view,
+    write_views,
 )
 from quiltcli.render.report import FrameRecord, write_report
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.render.workers import Pool, can_fork, shared_buffers, worth_forking
 from quiltcli.viewer.edge_on import eye_problems
-from quiltcli.viewer.view import View, views_of
+from quiltcli.viewer.view import View, by_file, views_of
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,8 @@ def render_frames(
     """
     stage, views = ready.stage, ready.views
     pooled = threads > 1 and can_fork() and worth_forking(stage)
+    groups = by_file(views)
+    most = max(map(len, groups), default=1)
     sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in views[:2]]
     # Forked before this process has threads of its own: a lock that one holds would stay locked.
     with ExitStack() as ends:
@@ -173,15 +176,18 @@ def render_frames(
         request = ends.enter_context(stop_between_frames())
         writer = ends.enter_context(Writer(ready, threads, listener, start))
         dirty = [np.zeros(stage.blocks.used.size, dtype=np.bool_) for _ in sheets]
-        for number, view in enumerate(views):
+        for number, group in enumerate(groups):
             request.check()
-            turn = number % len(sheets)
-            writer.leave(len(sheets) - 1)
-            if ready.only is not None:
-                read_quilt(stage, ready.out, view, sheets[turn])
-            now = stage.at(view.time)
-            record = draw_view(now, view, sheets[turn], threads, ready.only, dirty=dirty[turn], crew=pool)
-            writer.take(record, view, sheets[turn])
+            # One file is written while the next is drawn, unless it takes all the sheets there are.
+            writer.leave(len(sheets) // most - 1)
+            turns = [(number * most + place) % len(sheets) for place in range(len(group))]
+            records = []
+            for turn, view in zip(turns, group, strict=True):
+                if ready.only is not None:
+                    read_quilt(stage, ready.out, view, sheets[turn])
+                now, sheet = stage.at(view.time), sheets[turn]
+                records.append(draw_view(now, view, sheet, threads, ready.only, dirty=dirty[turn], crew=pool))
+            writer.take(records, [Drawn(view, sheets[turn]) for turn, view in zip(turns, group, strict=True)])
         writer.leave(0)
         request.check()
     return writer.records
@@ -204,7 +210,7 @@ class Writer:
         self._threads = threads
         self._listener = listener
         self._executor = ThreadPoolExecutor(1)
-        self._waiting: deque[Future[FrameRecord]] = deque()
+        self._waiting: deque[Future[list[FrameRecord]]] = deque()
 
     def __enter__(self) -> Writer:
         return self
@@ -218,26 +224,27 @@ class Writer:
         finally:
             self._executor.shutdown()
 
-    def take(self, record: FrameRecord, view: View, buffers: Buffers) -> None:
-        """Write a frame; its buffers must not change until `leave` has let it go."""
-        stage, out = self._ready.stage, self._ready.out
-        work = partial(write_view, stage, out, view, buffers, self._threads)
-        record = record.after("load", self._load)
+    def take(self, records: Sequence[FrameRecord], drawn: Sequence[Drawn]) -> None:
+        """Write views that share their files; their buffers must not change until `leave` has let them go."""
+        work = partial(write_views, self._ready.stage, self._ready.out, drawn, self._threads)
+        first, *others = records
+        first = first.after("load", self._load)
         self._load = 0.0
-        self._waiting.append(self._executor.submit(record.written, work))
+        self._waiting.append(self._executor.submit(lambda: [first.written(work), *others]))
 
     def leave(self, count: int) -> None:
         """Wait until at most `count` frames are unwritten; report those that are."""
         while len(self._waiting) > count:
             start = time.perf_counter()
-            record = self._waiting.popleft().result()
+            first, *others = self._waiting.popleft().result()
             now = time.perf_counter()
-            record = record.done(waited=now - start, wall=now - self._done)
+            records = [first.done(waited=now - start, wall=now - self._done), *others]
             self._done = now
-            self.records.append(record)
+            self.records += records
             out = self._ready.out
-            write_report(out.folder / "report.json", out.job_sha, __version__, [record])
-            self._listener.frame_done(record)
+            write_report(out.folder / "report.json", out.job_sha, __version__, records)
+            for record in records:
+                self._listener.frame_done(record)
 
 
 def chosen_facets(stage: Stage, ids: Sequence[int] | None) -> BoolArray | None:

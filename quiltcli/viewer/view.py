@@ -21,12 +21,14 @@ class View:
         eye: `left` or `right`, empty where there is one eye; it stands in the files' names.
         viewers: whoever looks, each at facets of their own.
         time: when they look, in frames: later than `frame` where the right eye looks later.
+        in_parts: whether both eyes' images are parts of one file, which is not named for an eye then.
     """
 
     frame: int
     eye: str
     viewers: tuple[Viewer, ...]
     time: float
+    in_parts: bool = False
 
     @property
     def viewer(self) -> Viewer:
@@ -44,9 +46,14 @@ class View:
         return f"{self.frame} ({self.eye})" if self.eye else str(self.frame)
 
     @property
-    def key(self) -> tuple[int, str]:
-        """What tells the view from all others of its job."""
-        return self.frame, self.eye
+    def file_key(self) -> tuple[int, str]:
+        """Frame and eye as the names of its files have them."""
+        return self.frame, "" if self.in_parts else self.eye
+
+    @property
+    def part(self) -> str:
+        """The part of its files that is this view's; empty where they have one part."""
+        return self.eye if self.in_parts else ""
 
 
 def views_at(job: JobFile, frame: int, clip: str | None = None) -> tuple[View, ...]:
@@ -67,7 +74,7 @@ def views_at(job: JobFile, frame: int, clip: str | None = None) -> tuple[View, .
     for eye in EYES:
         late = eye == "right" and any(_eye_time(spec) == "own" for spec in job.people.values())
         viewers = (_one_eye(job, name, frame, eye, clip) for name in job.people)
-        views.append(View(frame, eye, tuple(viewers), frame + 0.5 * late))
+        views.append(View(frame, eye, tuple(viewers), frame + 0.5 * late, job.output.stereo == "parts"))
     return tuple(views)
 
 
@@ -109,6 +116,14 @@ def views_of(job: JobFile, frames: Iterable[int], clip: str | None = None) -> li
                 break
     raise_all(ViewerError, list(problems))
     return views
+
+
+def by_file(views: Iterable[View]) -> list[tuple[View, ...]]:
+    """The views in groups that share their files: both eyes where they are parts, else each alone."""
+    groups: dict[tuple[int, str], list[View]] = {}
+    for view in views:
+        groups.setdefault(view.file_key, []).append(view)
+    return [tuple(group) for group in groups.values()]
 
 
 def viewers_of(job: JobFile, frames: Iterable[int]) -> list[Viewer]:

@@ -21,6 +21,12 @@ from tests.helpers.in_memory import CUBE, CUBE_FACES
 from tests.helpers.verified_jobs import EVERY, cube_job, found, shoot, write_job
 
 
+def verdict_on(job, options=None):
+    """The verdict on the only view of a job's first frame."""
+    [found] = verify(job, options)
+    return found.verdict
+
+
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory):
     return shoot(cube_job(tmp_path_factory.mktemp("cube")))
@@ -222,27 +228,27 @@ def test_no_facet_is_lit(tmp_path):
 class TestImagesOnDisk:
     def test_the_quilt_is_taken_when_this_job_made_it(self, tmp_path):
         job = cube_job(tmp_path)
-        assert "drawn in memory (" in verify(job)[0].images
+        assert "drawn in memory (" in verdict_on(job).images
         render(job)
-        verdict = verify(job)[0]
+        verdict = verdict_on(job)
         assert verdict.images == f"the quilt in {tmp_path / 'out'}"
         assert found(verdict) == {}
         assert verdict.inside["depths"] > 500
-        assert verify(job, VerifyOptions(redraw=True))[0].images == "drawn in memory"
+        assert verdict_on(job, VerifyOptions(redraw=True)).images == "drawn in memory"
 
     def test_another_jobs_quilt_is_not(self, tmp_path):
         render(cube_job(tmp_path))
-        assert "drawn in memory (" in verify(cube_job(tmp_path, far=99))[0].images
+        assert "drawn in memory (" in verdict_on(cube_job(tmp_path, far=99)).images
 
     def test_a_quilt_without_depth_is_not(self, tmp_path):
         job = cube_job(tmp_path, more="output: {channels: [rgba]}\n")
         render(job)
-        assert "has no Z)" in verify(job)[0].images
+        assert "has no Z)" in verdict_on(job).images
 
     def test_triangles_are_compared_where_they_were_written(self, tmp_path):
         job = cube_job(tmp_path, more="output: {channels: [Z, triangle]}\n")
         render(job)
-        assert verify(job)[0].inside["triangles"] > 500
+        assert verdict_on(job).inside["triangles"] > 500
 
     @pytest.mark.parametrize(("name", "kind"), [("Z", "depth"), ("A", "alpha")])
     def test_what_was_changed_on_disk_is_found(self, tmp_path, name, kind):
@@ -257,12 +263,12 @@ class TestImagesOnDisk:
         )
         channels[name] = channels[name].astype(image.channels[name].dtype)
         write_exr(path, channels, image.attributes)
-        assert kind in found(verify(job)[0])
+        assert kind in found(verdict_on(job))
 
     def test_several_samples_a_pixel_leave_depth_at_the_centre(self, tmp_path):
         job = cube_job(tmp_path, more="render: {samples: 2}\n")
         render(job)
-        verdict = verify(job)[0]
+        verdict = verdict_on(job)
         assert verdict.images.startswith("the quilt in")
         assert found(verdict) == {}
 

@@ -105,8 +105,8 @@ class Shot:
 
 def shoot(job: JobFile) -> Shot:
     stage = set_stage(job)
-    viewer = stage.views(list(job.frames))[0].viewer
-    return Shot(stage, viewer, draw_images(stage, viewer, threads=1))
+    view = stage.views(list(job.frames))[0]
+    return Shot(stage, view.viewer, draw_images(stage, view, threads=1))
 
 
 def found(verdict: Verdict) -> dict[str, int]:

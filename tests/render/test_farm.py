@@ -35,7 +35,7 @@ def address() -> Iterator[str]:
 
 def task(job_file: Path, frame: int, options: RenderOptions) -> Task:
     job = load_job(job_file)
-    return Task(job_file, job_sha256(job), views_at(job, frame)[0], options)
+    return Task(job_file, job_sha256(job), views_at(job, frame), options)
 
 
 def test_what_is_missing_is_named(tiny: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,9 +51,9 @@ def test_what_is_missing_is_named(tiny: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_a_task_that_runs_again_leaves_the_whole_frame_alone(tiny: Path) -> None:
     render(load_job(tiny), RenderOptions(frames=(1,)))
     resolved = tiny.parent / "out" / "job.yaml"
-    record = render_task(task(resolved, 2, RenderOptions()))
-    assert record is not None
-    assert record.frame == 2
+    records = render_task(task(resolved, 2, RenderOptions()))
+    assert records is not None
+    assert [record.frame for record in records] == [2]
     before = {path: path.stat().st_mtime_ns for path in tiny.parent.rglob("*.exr")}
     assert render_task(task(resolved, 2, RenderOptions())) is None
     assert before == {path: path.stat().st_mtime_ns for path in tiny.parent.rglob("*.exr")}

@@ -22,7 +22,8 @@ def viewer_at(viewer, frame, depth="planar"):
 
 
 def check_viewer(viewer, frames):
-    return view_problems(SimpleNamespace(viewer=viewer, render=SimpleNamespace(depth="planar")), frames)
+    how = SimpleNamespace(depth="planar")
+    return view_problems(SimpleNamespace(people={"": viewer}, is_stereo=False, render=how), frames)
 
 
 def spec(**path: Any) -> ViewerSpec:

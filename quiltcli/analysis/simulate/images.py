@@ -51,12 +51,12 @@ def shown_images(stage: Stage, view: View, folder: Path, job_sha: str, threads: 
 
 def _quilts(stage: Stage, view: View, folder: Path, job_sha: str) -> Buffers | None:
     """The quilt on disk, None where a page is missing or not this job's."""
-    paths = [quilt_path(folder, page + 1, *view.key) for page in range(len(stage.layout.pages))]
+    paths = [quilt_path(folder, page + 1, *view.file_key) for page in range(len(stage.layout.pages))]
     if not all(is_complete(path, job_sha, view.frame) for path in paths):
         return None
     buffers = {name: np.zeros(stage.owners.size, dtype=np.float16) for name in "RGB"}
     for page, path in enumerate(paths):
-        channels = whole_frame(read_exr(path))
+        channels = whole_frame(read_exr(path, view.part))
         if any(name not in channels for name in "RGB"):
             return None
         for name, flat in buffers.items():
@@ -67,12 +67,12 @@ def _quilts(stage: Stage, view: View, folder: Path, job_sha: str) -> Buffers | N
 def _facets(stage: Stage, lit: BoolArray, view: View, folder: Path, job_sha: str) -> Buffers | None:
     """The quilt put together from the lit facets' images on disk, None where one is missing."""
     rows = np.flatnonzero(lit).tolist()
-    paths = {row: facet_path(folder, int(stage.layout.facet[row]), *view.key) for row in rows}
+    paths = {row: facet_path(folder, int(stage.layout.facet[row]), *view.file_key) for row in rows}
     if not paths or not all(is_complete(path, job_sha, view.frame) for path in paths.values()):
         return None
     images = {}
     for row, path in paths.items():
-        channels = whole_frame(read_exr(path))
+        channels = whole_frame(read_exr(path, view.part))
         if any(name not in channels for name in "RGB"):
             return None
         images[row] = {name: channels[name] for name in "RGB"}

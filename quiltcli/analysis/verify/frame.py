@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -17,15 +17,16 @@ from quiltcli.analysis.verify.pixels import Trial, check_pixels
 from quiltcli.analysis.verify.sample import every_pixel, sampled_pixels
 from quiltcli.analysis.verify.seams import Seams, check_seams, seam_points
 from quiltcli.analysis.verify.tally import Fault, Tally
-from quiltcli.display import lit_facets, shared_edges
-from quiltcli.errors import ViewerError, raise_all
-from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.display import shared_edges
+from quiltcli.errors import JobError, Problem, ViewerError, raise_all
+from quiltcli.geometry import IntArray
 from quiltcli.job import JobFile
 from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.crew import default_threads
 from quiltcli.render.setup import Stage, set_stage
+from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.edge_on import eye_problems
-from quiltcli.viewer.view import views_of
+from quiltcli.viewer.view import View, views_of
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import aim
 from quiltcli.visibility.rays.exact import Neighbours
@@ -48,6 +49,8 @@ class Verdict:
         bleed: pixels in their bleed.
         outside: pixels of no lit facet that show something all the same.
         seams: the seams between facets.
+        eye: `left` or `right`, empty where there is one eye.
+        viewer: name of whoever looks, empty where there is nobody else.
     """
 
     frame: int
@@ -58,6 +61,8 @@ class Verdict:
     bleed: Tally
     outside: int
     seams: Seams
+    eye: str = ""
+    viewer: str = ""
 
     @property
     def passed(self) -> bool:
@@ -81,6 +86,8 @@ class Verdict:
         return {
             "quilt_verify": 1,
             "frame": self.frame,
+            **({"eye": self.eye} if self.eye else {}),
+            **({"viewer": self.viewer} if self.viewer else {}),
             "images": self.images,
             "all_pixels": self.everything,
             "lit_facets": self.lit,
@@ -104,6 +111,7 @@ class VerifyOptions:
         folder: where the images are, instead of the job's folder.
         redraw: draw in memory even if there are images.
         threads: blocks looked at at a time; 0 takes every core. The verdict does not depend on it.
+        eye: `left` or `right`; empty for every eye there is.
     """
 
     frame: int | None = None
@@ -112,31 +120,62 @@ class VerifyOptions:
     folder: Path | None = None
     redraw: bool = False
     threads: int = 0
+    eye: str = ""
 
 
-def verify(job: JobFile, options: VerifyOptions | None = None) -> tuple[Verdict, Stage, Images]:
-    """Hold one frame of a job against rays.
+@dataclass(frozen=True)
+class Verified:
+    """A verdict, and the stage and images it is about."""
 
-    Returns:
-        The verdict, and the stage and the images it is about.
+    verdict: Verdict
+    stage: Stage
+    images: Images
+
+
+def verify(job: JobFile, options: VerifyOptions | None = None) -> Iterator[Verified]:
+    """Hold one frame of a job against rays: what each eye of each viewer sees.
 
     Raises:
         QuiltError: the job cannot be rendered, or this machine has no Embree.
     """
     options = options or VerifyOptions()
     frame = job.frames[0] if options.frame is None else options.frame
-    views_of(job, [frame])  # what is wrong with the path is said before anything is loaded
-    stage = set_stage(job).at(frame)
-    [view] = stage.views([frame])
-    raise_all(ViewerError, eye_problems(stage.facets, view.viewers, job))
+    wanted = _wanted_eyes(job, views_of(job, [frame]), options.eye)  # before anything is loaded
+    stage = set_stage(job)
+    views = [view for view in stage.views([frame]) if view.eye in wanted]
+    viewers = [viewer for view in views for viewer in view.viewers]
+    raise_all(ViewerError, eye_problems(stage.facets, viewers, job))
     threads = options.threads or default_threads()
     folder = options.folder or job.output.directory
-    images = find_images(stage, view, folder, threads, options.redraw)
-    return verify_images(stage, view.viewer, images, options), stage, images
+    for view in views:
+        now = stage.at(view.time)
+        images = find_images(now, view, folder, threads, options.redraw)
+        for viewer in view.viewers:
+            verdict = verify_images(now, viewer, images, options, view.viewers)
+            yield Verified(replace(verdict, eye=view.eye, viewer=viewer.name), now, images)
 
 
-def verify_images(stage: Stage, viewer: Viewer, images: Images, options: VerifyOptions) -> Verdict:
-    """Hold images of a frame against rays, at the pixels `options` ask for."""
+def _wanted_eyes(job: JobFile, views: Sequence[View], eye: str) -> set[str]:
+    """The eyes that are asked for: all where none is named (JobError if there is no such eye)."""
+    there = {view.eye for view in views}
+    if eye and eye not in there:
+        words = f"--eye {eye}: the job has one eye (viewer.stereo gives it two)"
+        raise JobError(Problem(words))
+    return {eye} if eye else there
+
+
+def verify_images(
+    stage: Stage, viewer: Viewer, images: Images, options: VerifyOptions, everybody: Sequence[Viewer] = ()
+) -> Verdict:
+    """Hold images of a frame against rays, at the pixels `options` ask for.
+
+    Args:
+        stage: what the job's frames share, with the scene of this one.
+        viewer: whose facets are looked at.
+        images: what is verified.
+        options: how.
+        everybody: all who see something in these images; the viewer alone by default.
+    """
     trial = make_trial(stage, viewer, images)
     most = _ALL_SEAM_POINTS if options.everything else _SEAM_POINTS
     points = seam_points(trial, shared_edges(stage.facets), most)
@@ -156,7 +195,7 @@ def verify_images(stage: Stage, viewer: Viewer, images: Images, options: VerifyO
         lit=int(np.count_nonzero(trial.rays.lit)),
         inside=inside,
         bleed=bled,
-        outside=_shown_outside(stage, trial.rays.lit, images),
+        outside=_shown_outside(stage, everybody or (viewer,), images),
         seams=check_seams(trial, points),
     )
 
@@ -174,14 +213,15 @@ def _check_blocks(trial: Trial, blocks: Iterator[IntArray], threads: int) -> tup
 def make_trial(stage: Stage, viewer: Viewer, images: Images) -> Trial:
     """Prepare what the pixels of a frame are verified with."""
     scene = stage.scene
-    rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, viewer.eye), viewer.eye)
+    rays = quilt_rays(stage.facets, stage.layout, their_lit_facets(stage.facets, viewer), viewer.eye)
     target = aim(scene.vertices, scene.triangles, viewer, stage.job.render.backface_culling)
     neighbours = Neighbours(scene.vertices, scene.triangles)
     return Trial(stage.layout, stage.owners, rays, target, neighbours, images)
 
 
-def _shown_outside(stage: Stage, lit: BoolArray, images: Images) -> int:
-    """Pixels with a depth that belong to no lit facet."""
+def _shown_outside(stage: Stage, viewers: Sequence[Viewer], images: Images) -> int:
+    """Pixels with a depth that belong to no lit facet of anybody's."""
+    lit = np.logical_or.reduce([their_lit_facets(stage.facets, viewer) for viewer in viewers])
     shown = np.concatenate(([False], lit))
     count = 0
     for start in range(0, stage.owners.size, _BLOCK):

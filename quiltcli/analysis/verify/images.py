@@ -13,11 +13,10 @@ from quiltcli.images.metadata import is_complete
 from quiltcli.images.names import quilt_path
 from quiltcli.job import job_sha256
 from quiltcli.render.buffers import Buffers
-from quiltcli.render.methods import draw_frame
+from quiltcli.render.methods import draw_view
 from quiltcli.render.outputs import outputs, read_quilt
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.view import View
-from quiltcli.viewer.viewer import Viewer
 
 _DRAWN = ("Z", "triangle")
 
@@ -58,14 +57,13 @@ def find_images(stage: Stage, view: View, folder: Path, threads: int, redraw: bo
     """
     channels = stage.job.output.channels
     out = outputs(stage, folder, job_sha256(stage.job))
-    viewer = view.viewer
-    pages = [quilt_path(folder, page + 1, *view.key) for page in range(len(stage.layout.pages))]
+    pages = [quilt_path(folder, page + 1, *view.file_key) for page in range(len(stage.layout.pages))]
     if redraw:
-        return draw_images(stage, viewer, threads)
-    if not all(is_complete(path, out.job_sha, viewer.frame) for path in pages):
-        return draw_images(stage, viewer, threads, f" ({folder} has no quilt of this frame by this job)")
+        return draw_images(stage, view, threads)
+    if not all(is_complete(path, out.job_sha, view.frame) for path in pages):
+        return draw_images(stage, view, threads, f" ({folder} has no quilt of this frame by this job)")
     if "Z" not in channels:
-        return draw_images(stage, viewer, threads, f" (the quilt in {folder} has no Z)")
+        return draw_images(stage, view, threads, f" (the quilt in {folder} has no Z)")
     # With several samples a pixel, A is a share of them and Z is still the centre's.
     alpha = ("rgba",) if stage.job.render.samples == 1 else ()
     wanted = [name for name in channels if name in (*_DRAWN, *alpha)]
@@ -76,12 +74,12 @@ def find_images(stage: Stage, view: View, folder: Path, threads: int, redraw: bo
     return Images(f"the quilt in {folder}", buffers)
 
 
-def draw_images(stage: Stage, viewer: Viewer, threads: int, why: str = "") -> Images:
+def draw_images(stage: Stage, view: View, threads: int, why: str = "") -> Images:
     """Draw the depth and triangle of every pixel in memory."""
     job = stage.job
     output = job.output.model_copy(update={"channels": _DRAWN})
     render = job.render.model_copy(update={"samples": 1})
     plain = replace(stage, job=job.model_copy(update={"output": output, "render": render}))
     buffers = empty_buffers(_DRAWN, stage.owners.size)
-    draw_frame(plain, viewer, buffers, threads)
+    draw_view(plain, view, buffers, threads)
     return Images(f"drawn in memory{why}", buffers)

@@ -5,7 +5,7 @@ One image is one part of planar channels, each (H, W) of float16, float32 or uin
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -108,24 +108,44 @@ def write_exr(
     Raises:
         OutputError: the file cannot be written; nothing is left behind.
     """
-    header: dict[str, Any] = {name: _attribute(path, name, value) for name, value in attributes.items()}
-    header["compression"] = compression_constant(compression)
-    header["type"] = OpenEXR.scanlineimage
-    header[ATTRIBUTE] = BLANK
-    if data_window is not None:
-        header["dataWindow"] = data_window
-    if display_window is not None or data_window is not None:
-        header["displayWindow"] = display_window or data_window
-    pixels = _pixels(path, channels)  # a dict of our own: the library replaces its values
+    shape = next((np.shape(array) for array in channels.values()), ())
+    frame = (0, 0), (shape[-1] - 1, shape[0] - 1) if len(shape) == 2 else (0, 0)
+    data = data_window or frame
+    write_images(path, [Image(channels, attributes, compression, data, display_window or data)])
+
+
+def write_images(path: Path, images: Sequence[Image]) -> None:
+    """Write an image, or several with names of their own as the parts of one file; see `write_exr`."""
     with whole_file(path) as temporary:
         try:
-            OpenEXR.File(header, pixels).write(str(temporary))
+            _library_file(path, images).write(str(temporary))
         except RuntimeError as error:
             raise OutputError(write_problem(path, error)) from error
         # The library's stream is flushed when it is destroyed, where a full disk goes unreported.
         if fault := exr_fault(temporary):
             raise OutputError(Problem(f"cannot be written: what reached the disk {fault}", file=str(path)))
         seal(temporary)
+
+
+def _library_file(path: Path, images: Sequence[Image]) -> Any:
+    """The file as the library has it; its dicts are made anew, for the library adds to them."""
+    headers = [_header(path, image) for image in images]
+    headers[0][ATTRIBUTE] = BLANK
+    pixels = [_pixels(path, image.channels) for image in images]
+    if len(images) == 1:
+        return OpenEXR.File(headers[0], pixels[0])
+    names = [image.name for image in images]
+    return OpenEXR.File([OpenEXR.Part(*part) for part in zip(headers, pixels, names, strict=True)])
+
+
+def _header(path: Path, image: Image) -> dict[str, Any]:
+    """The library's header of an image."""
+    header: dict[str, Any] = {name: _attribute(path, name, value) for name, value in image.attributes.items()}
+    header["compression"] = compression_constant(image.compression)
+    header["type"] = OpenEXR.scanlineimage
+    header["dataWindow"] = image.data_window
+    header["displayWindow"] = image.display_window
+    return header
 
 
 def _pixels(path: Path, channels: Mapping[str, Channel]) -> dict[str, Channel]:
@@ -170,9 +190,15 @@ def read_parts(path: Path) -> tuple[Image, ...]:
     return images
 
 
-def read_exr(path: Path) -> Image:
-    """Read a file of one part; errors as for `read_parts`."""
+def read_exr(path: Path, part: str = "") -> Image:
+    """Read a file of one part, or the part of this name; errors as for `read_parts`."""
     parts = read_parts(path)
+    if part and len(parts) > 1:
+        named = [image for image in parts if image.name == part]
+        if not named:
+            names = ", ".join(image.name for image in parts)
+            raise OutputError(Problem(f"has no part {part} (its parts are {names})", file=str(path)))
+        return named[0]
     if len(parts) != 1:
         raise OutputError(Problem(f"has {len(parts)} parts, expected an image of one part", file=str(path)))
     return parts[0]
