@@ -12,7 +12,7 @@ from quiltcli.errors import QuiltError
 
 COMMANDS = (
     *("check", "compare", "contact", "diff", "export", "import", "info", "pack", "pattern", "preview"),
-    *("render", "simulate", "sweetspot", "unmap", "verify", "view"),
+    *("render", "simulate", "stereo", "sweetspot", "unmap", "verify", "view"),
 )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from quiltcli.cli.options import EXPOSURE, FRAMES, PATH, POINT, SETS, SIZE, THREADS, VIEW
+from quiltcli.cli.stereo import MATRICES
 
 
 @click.command()
@@ -35,6 +36,8 @@ from quiltcli.cli.options import EXPOSURE, FRAMES, PATH, POINT, SETS, SIZE, THRE
     default=None,
     help="From the eye, compare with a direct picture; not for a film alone.",
 )
+@click.option("--eye", type=click.Choice(("left", "right")), help="One eye of two; both by default.")
+@click.option("--glasses", type=click.Choice(MATRICES), help="Both eyes' pictures as one anaglyph.")
 @click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
 @click.option("--direct", type=PATH, help="Write the direct picture, as PNG.")
 @click.option("--heat-map", type=PATH, help="Write a picture of the errors, as PNG.")
@@ -53,7 +56,8 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
     from quiltcli.job import load_job
 
     wanted = ("direct", "heat_map", "view", "exposure", "video")
-    pictures = Pictures(how.pop("output"), **{name: how.pop(name) for name in wanted})
+    glasses, how["eye"] = how.pop("glasses") or "", how["eye"] or ""
+    pictures = Pictures(how.pop("output"), **{name: how.pop(name) for name in wanted}, glasses=glasses)
     if pictures.picture is None and pictures.video is None:
         raise click.UsageError("nothing to write: give -o PICTURE.png, --video FILM.mp4, or both")
     if how["compare"] is None:

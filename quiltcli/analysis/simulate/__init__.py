@@ -25,6 +25,7 @@ from quiltcli.analysis.simulate.picture import (
 from quiltcli.analysis.simulate.reference import resampled_light
 from quiltcli.analysis.simulate.thirdperson import third_person_camera, third_person_light
 from quiltcli.display import Facets
+from quiltcli.errors import JobError
 from quiltcli.geometry import Float32Array
 from quiltcli.images.preview import block_means
 from quiltcli.job import JobFile, job_sha256
@@ -63,6 +64,7 @@ class PictureOptions:
         scene: how a third person sees the scene, a name of `thirdperson.SCENES`.
         edges: draw a line along the edges of the facets; what is compared is the picture without.
         threads: batches drawn at a time; 0 takes every core.
+        eye: `left` or `right` of two eyes; empty for both.
     """
 
     size: tuple[int, int] = (1200, 900)
@@ -77,6 +79,7 @@ class PictureOptions:
     scene: str = "ghost"
     edges: bool = False
     threads: int = 0
+    eye: str = ""
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,7 @@ class Simulation:
         direct: (H, W, 3) the scene without a display, None where there is nothing to compare with.
         comparison: the figures, None likewise.
         source: where the facets' images came from, in words.
+        eye: `left` or `right`, empty where there is one eye or it is seen from another place.
     """
 
     frame: int
@@ -96,6 +100,7 @@ class Simulation:
     direct: Float32Array | None
     comparison: Comparison | None
     source: str
+    eye: str = ""
 
 
 def simulate(
@@ -113,10 +118,13 @@ def simulate(
     sha = job_sha256(job)
     stage = set_stage(with_channels(job, ("rgba",)))
     threads = options.threads or default_threads()
-    for view in stage.views(frames):
+    views = [view for view in stage.views(frames) if options.eye in ("", view.eye)]
+    if not views:
+        raise JobError(f"--eye {options.eye}: the job has one eye (viewer.stereo gives it two)")
+    for view in views:
         now, viewer = stage.at(view.time), view.viewer
         shown, source = shown_images(now, view, job.output.directory, sha, threads)
-        yield replace(take_picture(now, viewer, shown, options), source=source)
+        yield replace(take_picture(now, viewer, shown, options), source=source, eye=view.eye)
 
 
 def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from quiltcli.analysis.simulate import PictureOptions, Simulation, simulate
 from quiltcli.analysis.simulate.compare import figures, heat_map, heat_scale
@@ -14,6 +16,7 @@ from quiltcli.errors import JobError, OutputError, Problem
 from quiltcli.formats.video import coding_of, film
 from quiltcli.formats.whole import make_folder
 from quiltcli.images.preview import Look, display_values, write_bytes, write_png
+from quiltcli.images.stereo.anaglyph import MATRICES, anaglyph
 from quiltcli.job import JobFile
 from quiltcli.job.frames import frame_text
 
@@ -30,6 +33,7 @@ class Pictures:
         heat_map: the errors, if wanted.
         view, exposure: as for `preview.write_png`.
         video: a film of what is seen, all frames after one another, if wanted.
+        glasses: show both eyes' pictures as an anaglyph of this name; empty for each eye's own.
     """
 
     picture: Path | None = None
@@ -38,6 +42,7 @@ class Pictures:
     view: str = "aces"
     exposure: float = 0.0
     video: Path | None = None
+    glasses: str = ""
 
 
 def write_pictures(
@@ -49,9 +54,14 @@ def write_pictures(
         QuiltError: bad input, or a file that cannot be written.
     """
     _check(frames, options, pictures)
+    if job.is_stereo and pictures.video and not (options.eye or pictures.glasses):
+        raise JobError("a film shows one picture at a time (choose --eye left, --eye right or --glasses)")
+    if pictures.glasses and (not job.is_stereo or options.eye):
+        raise JobError("--glasses shows two eyes' pictures (expected a job with viewer.stereo, and no --eye)")
     with ExitStack() as ends:
         show = ends.enter_context(film(pictures.video, job.fps)) if pictures.video else None
-        for result in simulate(job, frames, options):
+        seen = simulate(job, frames, options)
+        for result in through_glasses(seen, pictures.glasses) if pictures.glasses else seen:
             if show and pictures.video:
                 look = Look(pictures.view, pictures.exposure, coding_of(pictures.video).depth)
                 show(display_values(result.picture, look))
@@ -61,12 +71,21 @@ def write_pictures(
         yield f"{'film':<24}{pictures.video} ({len(frames)} frames, {job.fps} a second)"
 
 
+def through_glasses(seen: Iterator[Simulation], matrix: str) -> Iterator[Simulation]:
+    """Both eyes' pictures as one, coloured for each eye's filter."""
+    for left in seen:
+        right = next(seen)
+        first, second = (np.ascontiguousarray(one.picture.transpose(2, 0, 1)) for one in (left, right))
+        mixed = anaglyph(first, second, MATRICES[matrix]).transpose(1, 2, 0)
+        yield replace(left, picture=mixed, direct=None, comparison=None, eye="")
+
+
 def _write_picture(result: Simulation, pictures: Pictures) -> Iterator[str]:
     """Write what is seen of the display, and say where from."""
     if pictures.picture is None:
         yield f"{'frame':<24}{result.frame}, {result.source}"
         return
-    written = numbered(pictures.picture, result.frame)
+    written = numbered(pictures.picture, result.frame, result.eye)
     make_folder(written.parent)
     write_png(written, result.picture, pictures.view, pictures.exposure)
     yield f"{'picture':<24}{written}"
@@ -90,9 +109,14 @@ def _check(frames: Sequence[int], options: PictureOptions, pictures: Pictures) -
         raise JobError("--direct and --heat-map need a comparison, which there is only from the viewer's eye")
 
 
-def numbered(path: Path, frame: int) -> Path:
-    """The path with the frame number in place of a run of `#` in its name."""
-    return path.with_name(_NUMBER.sub(frame_text(frame), path.name))
+def numbered(path: Path, frame: int, eye: str = "") -> Path:
+    """The path with the frame number for a run of `#` in its name, and the eye before that or at the end."""
+    name = path.name
+    if eye and (number := _NUMBER.search(name)):
+        name = f"{name[: number.start()]}{eye}.{name[number.start() :]}"
+    elif eye:
+        name = f"{path.stem}.{eye}{path.suffix}"
+    return path.with_name(_NUMBER.sub(frame_text(frame), name))
 
 
 def _write_comparison(result: Simulation, pictures: Pictures) -> Iterator[str]:
@@ -100,12 +124,12 @@ def _write_comparison(result: Simulation, pictures: Pictures) -> Iterator[str]:
     if result.comparison is None or result.direct is None:
         return
     if pictures.direct is not None:
-        path = numbered(pictures.direct, result.frame)
+        path = numbered(pictures.direct, result.frame, result.eye)
         make_folder(path.parent)
         write_png(path, result.direct, pictures.view, pictures.exposure)
         yield f"{'direct picture':<24}{path}"
     if pictures.heat_map is not None:
-        path = numbered(pictures.heat_map, result.frame)
+        path = numbered(pictures.heat_map, result.frame, result.eye)
         make_folder(path.parent)
         scale = heat_scale(result.comparison.error)
         write_bytes(path, heat_map(result.comparison.error, scale))

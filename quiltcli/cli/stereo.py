@@ -1,0 +1,60 @@
+"""`quilt stereo`: two eyes' images as stereo hardware takes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from quiltcli.cli.options import FRAMES, PATH
+
+MODES = (
+    *("anaglyph", "side-by-side", "side-by-side-half", "top-bottom", "top-bottom-half"),
+    *("rows", "columns", "checkerboard", "sequential", "rgb-frames"),
+)
+MATRICES = (
+    *("true", "grey", "color", "half-color", "optimized"),
+    *("dubois-red-cyan", "dubois-green-magenta", "dubois-amber-blue"),
+)
+
+
+@click.command()
+@click.argument("out", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="Folder for the images.")
+@click.option("--as", "mode", type=click.Choice(MODES), required=True, help="How the two become one.")
+@click.option(
+    "--matrix",
+    type=click.Choice(MATRICES),
+    default="dubois-red-cyan",
+    show_default=True,
+    help="Colours of an anaglyph.",
+)
+@click.option("--of", "kind", type=click.Choice(("pages", "facets")), default="pages", show_default=True)
+@click.option("-f", "--frames", type=FRAMES, help="Frames; all by default.")
+@click.option("--swap", is_flag=True, help="Take left for right.")
+@click.option("--sync-line", is_flag=True, help="A blue line in the last row, for shutter glasses.")
+@click.option("--overwrite", is_flag=True, help="Replace images that exist.")
+def stereo(
+    out: Path,
+    output: Path,
+    mode: str,
+    matrix: str,
+    kind: str,
+    frames: tuple[int, ...] | None,
+    swap: bool,
+    sync_line: bool,
+    overwrite: bool,
+) -> None:
+    """Make of the two eyes' images in OUT, the output folder of a render, what stereo hardware takes.
+
+    Rows, columns and checkerboards are counted from each panel's own top-left pixel, which is the left
+    eye's. A sequence has the left eye's image of frame n at 2n−1, the right one's at 2n.
+    """
+    from quiltcli.images.stereo.files import StereoOptions, write_stereo
+
+    options = StereoOptions(mode, kind.removesuffix("s"), frames, matrix, swap, sync_line, overwrite)
+    written = write_stereo(out, output, options)
+    for path in written[:12]:
+        click.echo(str(path))
+    if len(written) > 12:
+        click.echo(f"and {len(written) - 12} more in {output}")

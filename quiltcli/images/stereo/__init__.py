@@ -1,0 +1,1 @@
+"""Two eyes' images as stereo hardware takes them: anaglyphs, packings, interleavings, sequences."""
