@@ -1,21 +1,24 @@
-"""The polygon mesh record, the builder every reader fills, and the checks all formats share."""
+"""The polygon mesh record every reader fills, and what readers and users of it hold it to."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from quiltcli.errors import MeshError, Problem
-from quiltcli.geometry import BoolArray, FloatArray, IntArray, segments
+from quiltcli.formats.mesh.mtl import MeshMaterial
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, segments
 
 MOST_PROBLEMS = 50
+FARTHEST = 1e30
+"""Coordinates beyond this are no place: their products would leave float64."""
 
 
 @dataclass(frozen=True)
 class PolygonMesh:
-    """V vertices and F polygons, in file order, in the file's own units.
+    """V vertices and F polygons of C corners, in file order, in the file's own units.
 
     Attributes:
         vertices: (V, 3) float64 positions.
@@ -26,6 +29,16 @@ class PolygonMesh:
         names: F names, empty where the file gives none.
         lines: (F,) line of the file each face stands on, 0 where lines mean nothing.
         path: the file as the user named it, for messages.
+        normals: (C, 3) normals of the corners as written, NaN without one; None when none has one.
+        colors: (C, 3) linear colours of the corners, 1 without one; None when none has one.
+        variant: (C,) what tells corners of one vertex apart: where two of them have equal numbers,
+            everything else about them is equal too. None when it is so for all.
+        material: (F,) row of `materials` each face is made of, -1 for none.
+        materials: what the file's materials are, those that no file defines by name alone.
+        missing: material files that are named but not there.
+        vertex_lines: (V,) line each vertex stands on; None where lines mean nothing.
+        single: whether the positions are declared as float32, whatever digits were written.
+        flaws: what a display must not have and a scene can do without.
     """
 
     vertices: FloatArray
@@ -35,6 +48,15 @@ class PolygonMesh:
     names: tuple[str, ...]
     lines: IntArray
     path: str
+    normals: FloatArray | None = None
+    colors: Float32Array | None = None
+    variant: IntArray | None = None
+    material: IntArray | None = None
+    materials: tuple[MeshMaterial, ...] = ()
+    missing: tuple[str, ...] = ()
+    vertex_lines: IntArray | None = None
+    single: bool = False
+    flaws: tuple[Problem, ...] = ()
 
     @property
     def count(self) -> int:
@@ -42,104 +64,70 @@ class PolygonMesh:
         return len(self.names)
 
 
-@dataclass
-class MeshBuilder:
-    """What a reader has gathered so far; `finish` checks it and makes the mesh."""
+def check_display_mesh(mesh: PolygonMesh) -> None:
+    """Hold a mesh to what every display needs: faces of three corners or more at finite places.
 
-    path: str
-    vertices: list[Sequence[float]] = field(default_factory=list)
-    vertex_lines: list[int] = field(default_factory=list)
-    faces: list[Sequence[int]] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
-    uv: list[Sequence[Sequence[float]] | None] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    problems: list[Problem] = field(default_factory=list)
+    Raises:
+        MeshError: with every problem found, up to `MOST_PROBLEMS`.
+    """
+    raise_problems(list(mesh.flaws) or _empty(mesh) or _few_corners(mesh) or _nowhere(mesh), mesh.path)
 
-    def problem(self, message: str, line: int = 0) -> None:
-        """Note something wrong at this line and go on."""
-        self.problems.append(Problem(message, self.path, line))
 
-    def add_vertex(self, position: Sequence[float], line: int = 0) -> None:
-        """Append one vertex."""
-        self.vertices.append(position)
-        self.vertex_lines.append(line)
+def _empty(mesh: PolygonMesh) -> list[Problem]:
+    if mesh.count:
+        return []
+    if not len(mesh.vertices):
+        return [Problem("the mesh is empty (expected vertices and faces)", mesh.path)]
+    found = f"the mesh has {len(mesh.vertices)} vertices but no faces (expected one or more)"
+    return [Problem(found, mesh.path)]
 
-    def add_face(
-        self,
-        corners: Sequence[int],
-        line: int = 0,
-        uv: Sequence[Sequence[float]] | None = None,
-        name: str = "",
-    ) -> None:
-        """Append one face with 0-based `corners`; `uv` holds one pair a corner or is None."""
-        self.faces.append(corners)
-        self.lines.append(line)
-        self.uv.append(uv)
-        self.names.append(name)
 
-    def finish(self) -> PolygonMesh:
-        """Check what was gathered and make the mesh.
-
-        Raises:
-            MeshError: with every problem found, up to `MOST_PROBLEMS`.
-        """
-        if not self.problems:
-            self._check_sizes()
-        if not self.problems:
-            self._check_vertices()
-            self._check_faces()
-        raise_problems(self.problems, self.path)
-        counts = np.fromiter(map(len, self.faces), np.int64, len(self.faces))
-        start = np.concatenate((np.zeros(1, np.int64), np.cumsum(counts)))
-        return PolygonMesh(
-            vertices=np.array(self.vertices, dtype=np.float64).reshape(-1, 3),
-            corner_start=start,
-            corners=np.concatenate([np.asarray(f, dtype=np.int64) for f in self.faces]),
-            uv=self._corner_uv(start),
-            names=tuple(self.names),
-            lines=np.array(self.lines, dtype=np.int64),
-            path=self.path,
+def _few_corners(mesh: PolygonMesh) -> list[Problem]:
+    counts = np.diff(mesh.corner_start)
+    return [
+        Problem(
+            f"face {face + 1} has {counts[face]} corners (expected 3 or more)",
+            mesh.path,
+            int(mesh.lines[face]),
         )
+        for face in np.flatnonzero(counts < 3)
+    ]
 
-    def _check_sizes(self) -> None:
-        if not self.vertices and not self.faces:
-            self.problem("the mesh is empty (expected vertices and faces)")
-        elif not self.faces:
-            self.problem(f"the mesh has {len(self.vertices)} vertices but no faces (expected one or more)")
-        for index, corners in enumerate(self.faces):
-            if len(corners) < 3:
-                self.problem(
-                    f"face {index + 1} has {len(corners)} corners (expected 3 or more)", self.lines[index]
-                )
 
-    def _check_vertices(self) -> None:
-        bad = ~np.isfinite(np.array(self.vertices, dtype=np.float64).reshape(-1, 3)).all(axis=1)
-        for index in np.flatnonzero(bad):
-            found = ", ".join(f"{c:g}" for c in self.vertices[index])
-            self.problem(
-                f"vertex {index + 1} is ({found}) (expected finite numbers)", self.vertex_lines[index]
-            )
+def _nowhere(mesh: PolygonMesh) -> list[Problem]:
+    """Vertices of some face that are not finite or absurdly far away."""
+    used = np.zeros(len(mesh.vertices), np.bool_)
+    used[mesh.corners] = True
+    near = (np.abs(mesh.vertices) <= FARTHEST).all(axis=1)  # false for NaN
+    problems = []
+    for index in np.flatnonzero(used & ~near):
+        vertex = mesh.vertices[index]
+        found = ", ".join(f"{c:g}" for c in vertex)
+        expected = f"numbers up to {FARTHEST:g}" if np.isfinite(vertex).all() else "finite numbers"
+        line = 0 if mesh.vertex_lines is None else int(mesh.vertex_lines[index])
+        problems.append(Problem(f"vertex {index + 1} is ({found}) (expected {expected})", mesh.path, line))
+    return problems
 
-    def _check_faces(self) -> None:
-        counts = np.fromiter(map(len, self.faces), np.int64, len(self.faces))
-        flat = np.fromiter((c for face in self.faces for c in face), np.int64, int(counts.sum()))
-        row, _ = segments(np.concatenate(([0], np.cumsum(counts))))
-        outside: BoolArray = (flat < 0) | (flat >= len(self.vertices))
-        for place in np.flatnonzero(outside):
-            face = int(row[place])
-            self.problem(
-                f"face {face + 1} names vertex {flat[place] + 1} (expected 1 to {len(self.vertices)})",
-                self.lines[face],
-            )
 
-    def _corner_uv(self, start: IntArray) -> FloatArray | None:
-        if not any(pairs is not None for pairs in self.uv):
-            return None
-        result = np.full((int(start[-1]), 2), np.nan)
-        for face, pairs in enumerate(self.uv):
-            if pairs is not None:
-                result[start[face] : start[face + 1]] = pairs
-        return result
+def strange_corners(
+    outside: BoolArray, start: IntArray, written: Callable[[int], str], expected: str, lines: IntArray
+) -> list[tuple[str, int]]:
+    """Messages, with their lines, on corners (C,) that name vertices which are not there.
+
+    Args:
+        outside: (C,) whether a corner does.
+        start: (F+1,) offsets of the faces' corners.
+        written: what the file calls the vertex of a corner.
+        expected: what it might have called it, as `1 to 6`.
+        lines: (F,) lines of the faces.
+    """
+    if not outside.any():
+        return []
+    row, _ = segments(start)
+    return [
+        (f"face {row[k] + 1} names vertex {written(int(k))} (expected {expected})", int(lines[row[k]]))
+        for k in np.flatnonzero(outside)
+    ]
 
 
 def raise_problems(problems: Sequence[Problem], path: str) -> None:
@@ -152,9 +140,14 @@ def raise_problems(problems: Sequence[Problem], path: str) -> None:
     raise MeshError(shown)
 
 
-def one_face_groups(groups: Sequence[str]) -> list[str]:
-    """Names of faces from the name of the group each is in: only a group of one face names it."""
-    size: dict[str, int] = {}
-    for group in groups:
-        size[group] = size.get(group, 0) + 1
-    return [group if size[group] == 1 else "" for group in groups]
+def one_face_groups(group: IntArray, names: Sequence[str]) -> tuple[str, ...]:
+    """Names of faces from the group (F,) each is in: only a group of one face names it."""
+    # Groups of the same name are one group.
+    number = {name: row for row, name in enumerate(dict.fromkeys(names))}
+    merged = np.array([number[name] for name in names], np.int64)[group]
+    size = np.bincount(merged, minlength=len(number))
+    faces = [""] * len(group)
+    listed = list(number)
+    for face in np.flatnonzero(size[merged] == 1):
+        faces[face] = listed[merged[face]]
+    return tuple(faces)

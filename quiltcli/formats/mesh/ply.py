@@ -1,241 +1,227 @@
 """Stanford PLY: text and both binary byte orders, faces of any mixture of sizes.
 
-Texture coordinates are taken from the vertices (`s t`, `u v`, `texture_u texture_v`) or from a list
-on the faces (`texcoord`, two numbers a corner, the form MeshLab writes). Other elements and
-properties are passed over, which for lists means reading them row by row.
+Texture coordinates are taken from a list on the faces (`texcoord`, two numbers a corner, the form
+MeshLab writes) or from the vertices (`s t`, `u v`, `texture_u texture_v`), normals from the vertices
+(`nx ny nz`), colours from vertices or else faces (`red green blue`): integers span 0 to their largest,
+fractions 0 to 1, sRGB both. Triangle strips become triangles. Other elements and properties are
+passed over.
 """
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from quiltcli.formats.mesh.mesh import MeshBuilder
+from quiltcli.errors import MeshError, Problem
+from quiltcli.formats.mesh.colors import linear_from_srgb
+from quiltcli.formats.mesh.mesh import PolygonMesh, raise_problems, strange_corners
+from quiltcli.formats.mesh.mtl import MeshMaterial, MeshTexture, place_of
+from quiltcli.formats.mesh.ply_data import Element, List, read_elements
+from quiltcli.formats.mesh.ply_header import StopReadingError, read_header
+from quiltcli.formats.mesh.words import ragged
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, segments
 
-_TYPES = {
-    "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I",
-    "float": "f", "double": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H",
-    "int32": "i", "uint32": "I", "float32": "f", "float64": "d",
-}  # fmt: skip
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+_COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _CORNERS = ("vertex_indices", "vertex_index")
-
-Row: TypeAlias = Mapping[str, float | Sequence[float]]
-
-
-class _StopReadingError(Exception):
-    """The file is broken beyond going on; the text says how."""
-
-    def __init__(self, message: str, line: int = 0) -> None:
-        super().__init__(message)
-        self.line = line
+_LARGEST = {"b": 255, "B": 255, "h": 65535, "H": 65535}
+Faces: TypeAlias = tuple[IntArray, NDArray[np.generic], IntArray]
 
 
-@dataclass(frozen=True)
-class _Property:
-    name: str
-    code: str
-    count_code: str = ""  # set for lists
+def read_ply(data: bytes, path: Path) -> PolygonMesh:
+    """Read a PLY file's bytes.
 
-
-@dataclass
-class _Element:
-    name: str
-    count: int
-    properties: list[_Property]
-
-
-@dataclass(frozen=True)
-class _Header:
-    order: str  # "" for text, "<" or ">"
-    elements: list[_Element]
-    size: int  # bytes up to the first datum
-    lines: int
-
-
-def read_ply(data: bytes, builder: MeshBuilder) -> None:
-    """Read a PLY file's bytes into `builder`, noting what is wrong with its line or byte."""
+    Raises:
+        MeshError: what is wrong, with its line or byte.
+    """
     try:
-        header = _header(data)
-        rows = _binary_rows(data, header) if header.order else _text_rows(data, header)
-        _gather(rows, header, builder)
-    except _StopReadingError as stop:
-        builder.problem(str(stop), stop.line)
+        header = read_header(data)
+        elements = {element.name: element for element in read_elements(data, header)}
+        return _mesh(elements, header.texture, bool(header.order), path)
+    except StopReadingError as stop:
+        raise MeshError(Problem(str(stop), str(path), stop.line)) from None
 
 
-def _header(data: bytes) -> _Header:
-    order: str | None = None
-    elements: list[_Element] = []
-    place = 0
-    for line in range(1, 10_000):
-        end = data.find(b"\n", place)
-        if end < 0:
-            raise _StopReadingError("the header never ends (expected a line end_header)", line)
-        words = data[place:end].decode("latin-1").split()
-        place = end + 1
-        if line == 1 and words != ["ply"]:
-            raise _StopReadingError(f"found {' '.join(words)[:20]!r} (expected ply)", 1)
-        if words[:1] == ["format"]:
-            order = _byte_order(words, line)
-        elif words[:1] == ["element"]:
-            elements.append(_element(words, line))
-        elif words[:1] == ["property"]:
-            if not elements:
-                raise _StopReadingError("a property before the first element", line)
-            elements[-1].properties.append(_property(words, line))
-        elif words[:1] == ["end_header"]:
-            if order is None:
-                raise _StopReadingError("the header names no format", line)
-            return _Header(order, elements, place, line)
-    raise _StopReadingError("the header never ends (expected a line end_header)")
-
-
-def _byte_order(words: Sequence[str], line: int) -> str:
-    orders = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-    if len(words) < 2 or words[1] not in orders:
-        raise _StopReadingError(f"found {' '.join(words)!r} (expected one of {', '.join(orders)})", line)
-    return orders[words[1]]
-
-
-def _element(words: Sequence[str], line: int) -> _Element:
-    if len(words) != 3 or not words[2].isdecimal():
-        raise _StopReadingError(f"found {' '.join(words)!r} (expected element NAME COUNT)", line)
-    return _Element(words[1], int(words[2]), [])
-
-
-def _property(words: Sequence[str], line: int) -> _Property:
-    if len(words) == 3 and words[1] in _TYPES:
-        return _Property(words[2], _TYPES[words[1]])
-    if len(words) == 5 and words[1] == "list" and words[2] in _TYPES and words[3] in _TYPES:
-        return _Property(words[4], _TYPES[words[3]], _TYPES[words[2]])
-    raise _StopReadingError(
-        f"found {' '.join(words)!r} (expected property TYPE NAME or property list TYPE TYPE NAME)", line
+def _mesh(elements: dict[str, Element], texture: str, binary: bool, path: Path) -> PolygonMesh:
+    vertex, face = elements.get("vertex"), elements.get("face")
+    vertices = _positions(vertex)
+    if face is not None and not any(name in face.lists for name in _CORNERS):
+        raise StopReadingError(f"the faces have no list {_CORNERS[0]} or {_CORNERS[1]}")
+    start, named, lines = _joined(_faces(face), _strips(elements.get("tristrips")))
+    corners = _checked(named, start, lines, len(vertices), path)
+    face_uv = _face_uv(face, start, corners)
+    uv = _table(vertex, _UV_NAMES)[0] if face_uv is None else face_uv
+    colors, own_colors = _colors(vertex, face, start, corners)
+    count = len(start) - 1
+    return PolygonMesh(
+        vertices=vertices,
+        corner_start=start,
+        corners=corners,
+        uv=uv if uv is None or face_uv is not None else uv[corners],
+        names=("",) * count,
+        lines=lines,
+        path=str(path),
+        normals=_corner_normals(vertex, corners),
+        colors=colors,
+        variant=_variant(face_uv, start if own_colors else None),
+        material=np.zeros(count, np.int64) if texture else None,
+        materials=(_textured(texture, path),) if texture else (),
+        vertex_lines=None if vertex is None or vertex.lines is None else vertex.lines,
+        single=not binary and vertex is not None and vertex.codes.get("x") == "f",
     )
 
 
-def _text_rows(data: bytes, header: _Header) -> Iterator[tuple[_Element, int, Row]]:
-    """Yield (element, line, row) of every datum of a text file."""
-    lines = data[header.size :].decode("latin-1").splitlines()
-    numbered = ((header.lines + i, text.split()) for i, text in enumerate(lines, 1) if text.strip())
-    for element in header.elements:
-        for index in range(element.count):
-            line, words = next(numbered, (0, []))
-            if not line:
-                raise _StopReadingError(
-                    f"the file ends after {index} of {element.count} rows of {element.name}"
-                )
-            yield element, line, _text_row(element, index, words, line)
+def _textured(name: str, path: Path) -> MeshMaterial:
+    """The material of a `comment TextureFile`."""
+    texture = MeshTexture("color", name, place_of(path.parent, name))
+    return MeshMaterial("", textures=(texture,))
 
 
-def _text_row(element: _Element, index: int, words: Sequence[str], line: int) -> Row:
-    row: dict[str, float | Sequence[float]] = {}
-    rest = iter(words)
-    try:
-        for prop in element.properties:
-            read = float if prop.code in "fd" else int
-            if prop.count_code:
-                row[prop.name] = [read(next(rest)) for _ in range(int(next(rest)))]
-            else:
-                row[prop.name] = read(next(rest))
-    except ValueError:
-        raise _StopReadingError(
-            f"row {index + 1} of {element.name} is {' '.join(words)!r} (expected numbers)", line
-        ) from None
-    except (StopIteration, RuntimeError):  # next() inside the list turns into the latter
-        raise _StopReadingError(
-            f"row {index + 1} of {element.name} has {len(words)} numbers (expected more)", line
-        ) from None
-    return row
+def _positions(vertex: Element | None) -> FloatArray:
+    there = {} if vertex is None else vertex.scalars
+    if missing := [name for name in "xyz" if name not in there]:
+        raise StopReadingError(f"the vertices have no property {', '.join(missing)} (expected x, y and z)")
+    if vertex is not None and (twice := [name for name in "xyz" if name in vertex.doubled]):
+        raise StopReadingError(f"the vertices have the property {twice[0]} twice (expected x, y and z once)")
+    return np.stack([there[name].astype(np.float64) for name in "xyz"], axis=1)
 
 
-def _binary_rows(data: bytes, header: _Header) -> Iterator[tuple[_Element, int, Row]]:
-    """Yield (element, 0, row) of every datum of a binary file."""
-    place = header.size
-    for element in header.elements:
-        if any(prop.count_code for prop in element.properties):
-            for index in range(element.count):
-                row, place = _list_row(data, place, element, index, header.order)
-                yield element, 0, row
-            continue
-        kind = np.dtype([(prop.name, header.order + prop.code) for prop in element.properties])
-        need = element.count * kind.itemsize
-        if len(data) - place < need:
-            raise _StopReadingError(
-                f"truncated: the {element.count} rows of {element.name} need {need} bytes from byte {place}, "
-                f"but {len(data) - place} are there"
-            )
-        table = np.frombuffer(data, kind, element.count, place)
-        place += need
-        names = [prop.name for prop in element.properties]
-        for values in table.tolist():
-            yield element, 0, dict(zip(names, values, strict=True))
+def _faces(face: Element | None) -> Faces:
+    """Offsets, vertex numbers as written, and lines of the faces."""
+    if face is None:
+        return np.zeros(1, np.int64), np.zeros(0), np.zeros(0, np.int64)
+    name = next(name for name in _CORNERS if name in face.lists)
+    if name in face.doubled:
+        raise StopReadingError(f"the faces have the property {name} twice (expected it once)")
+    found = face.lists[name]
+    return found.start, found.values, _lines(face)
 
 
-def _list_row(data: bytes, place: int, element: _Element, index: int, order: str) -> tuple[Row, int]:
-    """One row of an element with lists, and the byte after it."""
-    row: dict[str, float | Sequence[float]] = {}
-    try:
-        for prop in element.properties:
-            count = 1
-            if prop.count_code:
-                (number,) = struct.unpack_from(order + prop.count_code, data, place)
-                count = int(number)
-                if count < 0:
-                    raise _StopReadingError(
-                        f"row {index + 1} of {element.name} has a list of {count} numbers at byte {place}"
-                    )
-                place += struct.calcsize(prop.count_code)
-            values = struct.unpack_from(f"{order}{count}{prop.code}", data, place)
-            place += count * struct.calcsize(prop.code)
-            row[prop.name] = values if prop.count_code else values[0]
-    except struct.error:
-        raise _StopReadingError(
-            f"truncated: row {index + 1} of {element.count} of {element.name} runs past the end, "
-            f"byte {len(data)}"
-        ) from None
-    return row, place
+def _lines(element: Element) -> IntArray:
+    return np.zeros(element.count, np.int64) if element.lines is None else element.lines
 
 
-def _gather(rows: Iterator[tuple[_Element, int, Row]], header: _Header, builder: MeshBuilder) -> None:
-    """Keep the vertices and faces among the rows."""
-    uv_names = _check_properties(header)
-    texture: list[tuple[float, float]] = []
-    for element, line, row in rows:
-        if element.name == "vertex":
-            builder.add_vertex((_number(row["x"]), _number(row["y"]), _number(row["z"])), line)
-            if uv_names:
-                texture.append((_number(row[uv_names[0]]), _number(row[uv_names[1]])))
-        elif element.name == "face":
-            found = row.get(_CORNERS[0], row.get(_CORNERS[1]))
-            corners = [int(c) for c in found] if isinstance(found, Sequence) else []
-            builder.add_face(corners, line, _face_uv(row, corners, texture))
+def _strips(element: Element | None) -> Faces:
+    """The triangles of strips, which -1 parts; every other one is turned so that all face one way."""
+    found = None if element is None else next((element.lists[n] for n in _CORNERS if n in element.lists), None)
+    if element is None or found is None:
+        return np.zeros(1, np.int64), np.zeros(0), np.zeros(0, np.int64)
+    row, rank = segments(found.start)
+    values, place = found.values, np.arange(len(found.values))
+    # Where each strip, or the piece of it behind a -1, begins.
+    begins = np.maximum.accumulate(np.where((rank == 0) | (np.roll(values, 1) == -1), place, 0))
+    third = np.flatnonzero((place - begins >= 2) & (values != -1))
+    third = third[(values[third - 1] != -1) & (values[third - 2] != -1)]
+    odd = (third - begins[third]) % 2 == 1
+    first, second = np.where(odd, third - 1, third - 2), np.where(odd, third - 2, third - 1)
+    corners = values[np.stack((first, second, third), axis=1)]
+    # Strips repeat vertices to turn round corners: such triangles are no faces.
+    real = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    start = 3 * np.arange(np.count_nonzero(real) + 1, dtype=np.int64)
+    return start, corners[real].ravel(), _lines(element)[row[third[real]]]
 
 
-def _check_properties(header: _Header) -> tuple[str, str] | None:
-    """Raise when positions or corners are missing; return the vertices' texture properties."""
-    by_name = {element.name: {p.name for p in element.properties} for element in header.elements}
-    if missing := [name for name in "xyz" if name not in by_name.get("vertex", set())]:
-        raise _StopReadingError(f"the vertices have no property {', '.join(missing)} (expected x, y and z)")
-    faces = by_name.get("face")
-    if faces is not None and not faces.intersection(_CORNERS):
-        raise _StopReadingError(f"the faces have no list {_CORNERS[0]} or {_CORNERS[1]}")
-    return next((pair for pair in _UV_NAMES if set(pair) <= by_name["vertex"]), None)
+def _joined(faces: Faces, strips: Faces) -> Faces:
+    if len(strips[0]) == 1:
+        return faces
+    start = np.concatenate((faces[0], faces[0][-1] + strips[0][1:]))
+    return start, np.concatenate((faces[1], strips[1])), np.concatenate((faces[2], strips[2]))
 
 
-def _face_uv(
-    row: Row, corners: Sequence[int], texture: Sequence[tuple[float, float]]
-) -> Sequence[Sequence[float]] | None:
-    listed = row.get("texcoord")
-    if isinstance(listed, Sequence) and corners and len(listed) == 2 * len(corners):
-        return list(zip(listed[0::2], listed[1::2], strict=True))
-    if texture and all(0 <= corner < len(texture) for corner in corners):
-        return [texture[corner] for corner in corners]
-    return None
+def _checked(
+    named: NDArray[np.generic], start: IntArray, lines: IntArray, count: int, path: Path
+) -> IntArray:
+    """Vertex numbers (C,) that are there.
+
+    Raises:
+        MeshError: some are not.
+    """
+    outside: BoolArray = ~((named >= 0) & (named < count))  # true for NaN
+    if named.dtype.kind == "f":
+        outside |= np.where(outside, 0, named) % 1 != 0
+
+    def written(corner: int) -> str:
+        value = named[corner]
+        return f"{value:.17g}" if named.dtype.kind == "f" else str(value)
+
+    found = strange_corners(outside, start, written, f"0 to {count - 1}", lines)
+    raise_problems([Problem(message, str(path), line) for message, line in found], str(path))
+    return named.astype(np.int64)
 
 
-def _number(value: float | Sequence[float]) -> float:
-    return float(value) if isinstance(value, (int, float)) else float("nan")
+def _table(
+    element: Element | None, choices: tuple[tuple[str, ...], ...]
+) -> tuple[FloatArray | None, tuple[str, ...]]:
+    """The columns of the first choice that is there, side by side, and their names."""
+    if element is None:
+        return None, ()
+    for names in choices:
+        if all(name in element.scalars for name in names):
+            columns = [element.scalars[name].astype(np.float64) for name in names]
+            return np.stack(columns, axis=1), names
+    return None, ()
+
+
+def _corner_normals(vertex: Element | None, corners: IntArray) -> FloatArray | None:
+    normals, _ = _table(vertex, (("nx", "ny", "nz"),))
+    return None if normals is None else normals[corners]
+
+
+def _colors(
+    vertex: Element | None, face: Element | None, start: IntArray, corners: IntArray
+) -> tuple[Float32Array | None, bool]:
+    """Linear colours (C, 3) of the corners, and whether they are the faces' own."""
+    given = _linear(vertex)
+    if given is not None:
+        return given[corners], False
+    given = _linear(face)
+    if given is None:
+        return None, False
+    row, _ = segments(start)
+    white = np.ones((len(start) - 1 - len(given), 3), np.float32)  # triangles of strips
+    return np.concatenate((given, white))[row], True
+
+
+def _linear(element: Element | None) -> Float32Array | None:
+    colors, names = _table(element, _COLORS)
+    if colors is None or element is None:
+        return None
+    code = element.codes[names[0]]
+    if code in "fd":
+        scale = 255 if np.nanmax(colors, initial=0.0) > 1 else 1
+    else:
+        scale = _LARGEST.get(code, 255)
+    return linear_from_srgb(colors / scale)
+
+
+def _face_uv(face: Element | None, start: IntArray, corners: IntArray) -> FloatArray | None:
+    """Texture coordinates (C, 2) from the faces' own lists, NaN where a list does not fit its face."""
+    listed: List | None = None if face is None else face.lists.get("texcoord")
+    if listed is None:
+        return None
+    counts, given = np.diff(start), np.diff(listed.start)
+    fits = np.zeros(len(counts), np.bool_)
+    fits[: len(given)] = given == 2 * counts[: len(given)]
+    row, rank = segments(start)
+    fits &= counts > 0
+    if not fits.any():
+        return None
+    uv = np.full((len(corners), 2), np.nan)
+    chosen = np.flatnonzero(fits[row])
+    place = listed.start[row[chosen]] + 2 * rank[chosen]
+    uv[chosen] = listed.values[place[:, None] + np.arange(2)]
+    return uv
+
+
+def _variant(face_uv: FloatArray | None, start: IntArray | None) -> IntArray | None:
+    """Corners differ by texture coordinates of their own, and by faces that have a colour."""
+    if start is not None:
+        return segments(start)[0]
+    if face_uv is None:
+        return None
+    pairs = np.ascontiguousarray(face_uv + 0.0).view(np.complex128).ravel()
+    _, number = np.unique(pairs, return_inverse=True)
+    return number.reshape(-1)

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from quiltcli.errors import MeshError, Problem
-from quiltcli.formats.mesh.mesh import MeshBuilder, PolygonMesh
+from quiltcli.formats.mesh.mesh import PolygonMesh, check_display_mesh
 from quiltcli.formats.mesh.obj import read_obj
 from quiltcli.formats.mesh.off import read_off
 from quiltcli.formats.mesh.ply import read_ply
+from quiltcli.formats.mesh.stl import read_stl
 
-_TEXT = {".obj": read_obj, ".off": read_off}
-_TRIANGLES = (".stl", ".glb", ".gltf")
-SUFFIXES = (*_TEXT, ".ply", *_TRIANGLES)
+READERS: Mapping[str, Callable[[bytes, Path], PolygonMesh]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+}
+"""Our own readers, by suffix: of a file's bytes, and of its path for what it names beside it."""
+
+SUFFIXES = (*READERS, ".glb", ".gltf")
 
 
 def read_mesh(path: Path | str) -> PolygonMesh:
@@ -31,15 +39,18 @@ def read_mesh(path: Path | str) -> PolygonMesh:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise _error(path, f"unknown mesh format {path.suffix!r} (expected {', '.join(SUFFIXES)})")
-    data = _bytes(path)
-    builder = MeshBuilder(str(path))
-    if suffix == ".ply":
-        read_ply(data, builder)
-    elif suffix in _TEXT:
-        _TEXT[suffix](data.decode("utf-8", errors="replace"), builder)
-    else:
-        _read_triangles(path, builder)
-    return builder.finish()
+    mesh = read_polygons(path) if suffix in READERS else _read_triangles(path)
+    check_display_mesh(mesh)
+    return mesh
+
+
+def read_polygons(path: Path) -> PolygonMesh:
+    """Read a file that one of `READERS` reads, whether or not a display could be made of it.
+
+    Raises:
+        MeshError: the file is missing or broken. All problems at once.
+    """
+    return READERS[path.suffix.lower()](_bytes(path), path)
 
 
 def _bytes(path: Path) -> bytes:
@@ -57,22 +68,40 @@ def _error(path: Path, message: str) -> MeshError:
     return MeshError(Problem(message, str(path)))
 
 
-def _read_triangles(path: Path, builder: MeshBuilder) -> None:
-    """STL and glTF through trimesh, which keeps the order of triangles when told not to process."""
+def _read_triangles(path: Path) -> PolygonMesh:
+    """GlTF through trimesh, which keeps the order of triangles when told not to process."""
     import trimesh
 
+    _bytes(path)
     try:
         scene = trimesh.load_scene(path, process=False)
         pieces = _baked(scene)
     except Exception as error:  # the readers behind it raise whatever they meet
         raise _error(path, f"cannot be read as {path.suffix[1:].upper()}: {error}") from error
-    for vertices, triangles, uv in pieces:
-        base = len(builder.vertices)
-        builder.vertices.extend(vertices.tolist())
-        builder.vertex_lines.extend([0] * len(vertices))
-        for corners in triangles.tolist():
-            pairs = None if uv is None else uv[corners].tolist()
-            builder.add_face([base + corner for corner in corners], 0, pairs)
+    base = np.cumsum([0, *(len(vertices) for vertices, _, _ in pieces)])
+    corners = [triangles.ravel() + start for (_, triangles, _), start in zip(pieces, base, strict=False)]
+    joined = np.concatenate([*corners, np.zeros(0, np.int64)]).astype(np.int64)
+    count = len(joined) // 3
+    return PolygonMesh(
+        vertices=np.concatenate([*(vertices for vertices, _, _ in pieces), np.zeros((0, 3))]),
+        corner_start=3 * np.arange(count + 1, dtype=np.int64),
+        corners=joined,
+        uv=_corner_uv(pieces),
+        names=("",) * count,
+        lines=np.zeros(count, np.int64),
+        path=str(path),
+    )
+
+
+def _corner_uv(pieces: list[tuple[Any, Any, Any]]) -> Any:
+    if all(uv is None for _, _, uv in pieces):
+        return None
+    return np.concatenate(
+        [
+            np.full((triangles.size, 2), np.nan) if uv is None else uv[triangles.ravel()]
+            for _, triangles, uv in pieces
+        ]
+    )
 
 
 def _baked(scene: Any) -> list[tuple[Any, Any, Any]]:
