@@ -8,10 +8,10 @@ import numpy as np
 
 from quiltcli.display.check import called, check_polygons
 from quiltcli.display.facets import Facets, Places
-from quiltcli.display.polygon import area_vectors
 from quiltcli.display.rasters import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
 from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
+from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, dot, normalized
 from quiltcli.job.display import DisplayFile, FacetSpec
 

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from quiltcli.display.polygon import area_vectors, convex, crossing_edges, diameters, plane_coordinates
 from quiltcli.display.weld import weld
 from quiltcli.errors import Problem
+from quiltcli.formats.mesh.crossings import crossing_edges
+from quiltcli.formats.mesh.polygons import area_vectors, convex, diameters, plane_coordinates
 from quiltcli.geometry import FloatArray, IntArray, cross, dot, next_in_row, normalized, segments
 
 PLANAR = 1e-4  # of the facet's size

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.display.edges import SharedEdges, find_shared_edges
-from quiltcli.display.polygon import convex, ear_clip, plane_coordinates
 from quiltcli.errors import Problem
+from quiltcli.formats.mesh import polygons
 from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, facet_from_world, segments
 
@@ -135,20 +135,8 @@ def triangulate(facets: Facets) -> tuple[Int32Array, Int32Array]:
         triangles (T, 3) int32 indices into `corners`, and facet (T,) int32, 0-based, ascending.
     """
     start = facets.corner_start
-    points = plane_coordinates(facets.corners, start)
-    fans = convex(points, start, straight=False)
-    row, rank = segments(start)
-    # Corner k of a fan, but for its first and last, makes the triangle (first, k, k + 1).
-    second = np.flatnonzero(fans[row] & (rank > 0) & (rank < np.diff(start)[row] - 1))
-    triangles = [np.stack((start[row[second]], second, second + 1), axis=1)]
-    owners: list[IntArray] = [row[second]]
-    for cut in np.flatnonzero(~fans).tolist():
-        ears = ear_clip(points[start[cut] : start[cut + 1]])
-        triangles.append(start[cut] + np.array(ears, np.int64).reshape(-1, 3))
-        owners.append(np.full(len(ears), cut))
-    facet = np.concatenate(owners)
-    order = np.argsort(facet, kind="stable")
-    return np.concatenate(triangles)[order].astype(np.int32), facet[order].astype(np.int32)
+    cut = polygons.triangulate(polygons.plane_coordinates(facets.corners, start), start)
+    return cut.corners.astype(np.int32), cut.face.astype(np.int32)
 
 
 def convex_parts(facets: Facets) -> tuple[Int32Array, IntArray, Int32Array]:
@@ -159,7 +147,7 @@ def convex_parts(facets: Facets) -> tuple[Int32Array, IntArray, Int32Array]:
         part_corners (M,) int32 indices into `facets.corners`, in the winding of the mesh.
     """
     start = facets.corner_start
-    whole = convex(plane_coordinates(facets.corners, start), start)
+    whole = polygons.convex(polygons.plane_coordinates(facets.corners, start), start)
     if whole.all():
         return np.arange(facets.count, dtype=np.int32), start, np.arange(start[-1], dtype=np.int32)
     triangles, owner = triangulate(facets)

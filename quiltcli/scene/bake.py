@@ -28,6 +28,7 @@ class Baked:
         part: (T,) index of the part each triangle came from.
         infinite: triangles dropped for a NaN or infinite vertex.
         empty: triangles dropped for having no area.
+        uv: (V, 2) texture coordinates, NaN where a part has none, or None where no part has any.
     """
 
     vertices: FloatArray
@@ -38,6 +39,7 @@ class Baked:
     part: IntArray
     infinite: int
     empty: int
+    uv: FloatArray | None = None
 
 
 def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
@@ -58,9 +60,13 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
     triangles, owner = triangles[keep], owner[keep]
 
     given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
-    colors = _given_colors(parts)
+    colors, uv = _given_colors(parts), _given_uv(parts)
     source, triangles, normals = _with_normals(
-        vertices, triangles, given, 180.0 if mode != "auto" else CREASE_DEG, keep_sources=colors is not None
+        vertices,
+        triangles,
+        given,
+        180.0 if mode != "auto" else CREASE_DEG,
+        keep_sources=colors is not None or uv is not None,
     )
     return Baked(
         vertices=vertices[source],
@@ -71,6 +77,7 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
         part=owner,
         infinite=int(np.count_nonzero(infinite)),
         empty=int(np.count_nonzero(empty)),
+        uv=None if uv is None else uv[source],
     )
 
 
@@ -107,6 +114,12 @@ def _given_colors(parts: Sequence[Part]) -> Float32Array | None:
     return np.concatenate(
         [np.ones(p.vertices.shape, np.float32) if p.colors is None else p.colors for p in parts]
     )
+
+
+def _given_uv(parts: Sequence[Part]) -> FloatArray | None:
+    if all(part.uv is None for part in parts):
+        return None
+    return np.concatenate([np.full((len(p.vertices), 2), np.nan) if p.uv is None else p.uv for p in parts])
 
 
 def _with_normals(

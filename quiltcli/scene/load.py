@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from quiltcli.errors import Problem, SceneError, raise_all
+from quiltcli.formats.mesh.coverage import Coverage
 from quiltcli.geometry import Float32Array, FloatArray, normalized
 from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
@@ -54,6 +55,7 @@ class _Gathered:
     materials: list[list[int]] = field(default_factory=list)
     surfaces: dict[Surface, int] = field(default_factory=dict)
     textures: int = 0
+    coverage: Coverage = Coverage()
     notices: list[str] = field(default_factory=list)
 
     def add(self, name: str, asset: Asset, baked: Baked, surfaces: Sequence[Surface]) -> None:
@@ -62,9 +64,11 @@ class _Gathered:
         self.baked.append(baked)
         self.materials.append([self.surfaces.setdefault(s, len(self.surfaces)) for s in surfaces])
         self.textures += asset.textures
+        self.coverage += asset.coverage
         for count, why in ((baked.infinite, "with NaN or infinite vertices"), (baked.empty, "of no area")):
             if count:
                 self.notices.append(f"{name}: {_counted(count, 'triangle')} {why} dropped")
+        self.notices += [f"{name}: {notice}" for notice in asset.notices]
         for missing in asset.missing:
             self.notices.append(f"{name}: the material file {missing!r} is missing (default materials used)")
 
@@ -137,11 +141,19 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         lights=_lights(lights),
         background=np.array(background, dtype=np.float32),
         notices=_notices(gathered, unlit=not lights),
+        uv=_uv(baked),
+        coverage=gathered.coverage,
     )
 
 
 def _colors(baked: Baked) -> Float32Array:
     return np.ones(baked.vertices.shape, np.float32) if baked.colors is None else baked.colors
+
+
+def _uv(baked: Sequence[Baked]) -> FloatArray | None:
+    if all(b.uv is None for b in baked):
+        return None
+    return np.concatenate([np.full((len(b.vertices), 2), np.nan) if b.uv is None else b.uv for b in baked])
 
 
 def _notices(gathered: _Gathered, *, unlit: bool) -> tuple[str, ...]:

@@ -12,6 +12,31 @@ from quiltcli.scene.scene import Materials
 
 
 @dataclass(frozen=True)
+class Texture:
+    """An image that varies a surface; carried along, not drawn yet.
+
+    Attributes:
+        role: what it varies: `color`, `emission`, `roughness`, `metallic`, `opacity`, `normal`, `bump`, …
+        path: its file.
+        offset: added to texture coordinates (u, v), v up.
+        scale: multiplies them first.
+        clamp: whether they are held to 0…1 instead of repeating.
+        strength: multiplies a bump.
+        gain: base and gain: values become base + gain · value.
+        channel: the channel to use, empty for what the role asks for.
+    """
+
+    role: str
+    path: str
+    offset: tuple[float, float] = (0.0, 0.0)
+    scale: tuple[float, float] = (1.0, 1.0)
+    clamp: bool = False
+    strength: float = 1.0
+    gain: tuple[float, float] = (0.0, 1.0)
+    channel: str = ""
+
+
+@dataclass(frozen=True)
 class Surface:
     """One material; equal surfaces share a row of the scene's table.
 
@@ -22,6 +47,7 @@ class Surface:
         emission: emitted radiance, linear.
         unlit: shows exactly `color`.
         specular: 0 to 1, strength of the layer that reflects; metals reflect all the same.
+        textures: images that vary it.
     """
 
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)
@@ -30,10 +56,12 @@ class Surface:
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     unlit: bool = False
     specular: float = 1.0
+    textures: tuple[Texture, ...] = ()
 
     def overridden(self, given: Mapping[str, Any]) -> Surface:
-        """This surface with the keys of `given` in place of its own."""
+        """This surface with the keys of `given` in place of its own, and without the images that vary those."""
         changes: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
+        changes.setdefault("textures", tuple(t for t in self.textures if t.role not in changes))
         return replace(self, **changes)
 
 
@@ -46,4 +74,5 @@ def material_table(surfaces: Sequence[Surface]) -> Materials:
         emission=np.array([s.emission for s in surfaces], dtype=np.float32).reshape(-1, 3),
         unlit=np.array([s.unlit for s in surfaces], dtype=np.bool_),
         specular=np.array([s.specular for s in surfaces], dtype=np.float32),
+        textures=tuple(s.textures for s in surfaces),
     )

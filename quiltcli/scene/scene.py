@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from quiltcli.formats.mesh.coverage import Coverage
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, cross, dot, normalized
+
+if TYPE_CHECKING:
+    from quiltcli.scene.materials import Texture
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,7 @@ class Materials:
         emission: (M, 3) emitted radiance, linear.
         unlit: (M,) materials that show exactly `color`.
         specular: (M,) 0 to 1, strength of the layer that reflects; metals reflect all the same.
+        textures: the images that vary each, carried along and not drawn yet.
     """
 
     color: Float32Array
@@ -30,6 +35,7 @@ class Materials:
     emission: Float32Array
     unlit: BoolArray
     specular: Float32Array
+    textures: tuple[tuple[Texture, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,8 @@ class Scene:
         lights: the lights.
         background: (3,) linear colour where nothing is hit.
         notices: sentences to tell the user once: what was dropped or assumed.
+        uv: (V, 2) texture coordinates, v up, NaN where there are none; None when there are none at all.
+        coverage: how the areas of the files' polygons compare with those of their triangles.
     """
 
     vertices: FloatArray
@@ -90,6 +98,8 @@ class Scene:
     lights: Lights
     background: Float32Array
     notices: tuple[str, ...]
+    uv: FloatArray | None = None
+    coverage: Coverage = Coverage()
 
     @cached_property
     def planes(self) -> FloatArray:

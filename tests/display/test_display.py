@@ -21,8 +21,8 @@ from quiltcli.display import (
     shared_edges,
     triangulate,
 )
-from quiltcli.display.polygon import area_vectors
 from quiltcli.formats.mesh import PolygonMesh
+from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import FloatArray, cross, dot, facet_from_world, normalized, rotation_deg
 from quiltcli.job import DisplayFile, load_display_file
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from quiltcli.display import lit_facets
-from quiltcli.display.polygon import area_vectors
 from quiltcli.errors import ViewerError
+from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import normalized
 from quiltcli.layout import check_layout, pixel_owners
 from quiltcli.projection.camera import aimed, camera_display, frame_display

@@ -9,7 +9,7 @@ import numpy as np
 
 from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, number, size, spread
 from quiltcli.display import Facets, load_display, pitch_mm, shared_edges
-from quiltcli.display.polygon import area_vectors
+from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import FloatArray, IntArray, dot
 from quiltcli.job import DisplayFile, load_display_file
 

@@ -123,7 +123,9 @@ def _header(text: Statements, path: str) -> _Header:
     word = int(text.first[row]) + (taken if row == 0 else 0)
     here = [text.word(k) for k in range(word, int(text.first[row + 1]))]
     counts = [*glued, *here][:3]
-    if len(counts) < 2 or not all(n.isascii() and n.isdecimal() and len(n) <= _MOST_DIGITS for n in counts[:2]):
+    if len(counts) < 2 or not all(
+        n.isascii() and n.isdecimal() and len(n) <= _MOST_DIGITS for n in counts[:2]
+    ):
         shown = " ".join([*glued, *here])[:60]
         message = f"found {shown!r} (expected the counts of vertices, faces and edges)"
         raise _error(path, message, text.line(row))

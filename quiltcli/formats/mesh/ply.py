@@ -21,7 +21,6 @@ from quiltcli.formats.mesh.mesh import PolygonMesh, raise_problems, strange_corn
 from quiltcli.formats.mesh.mtl import MeshMaterial, MeshTexture, place_of
 from quiltcli.formats.mesh.ply_data import Element, List, read_elements
 from quiltcli.formats.mesh.ply_header import StopReadingError, read_header
-from quiltcli.formats.mesh.words import ragged
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, segments
 
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
@@ -106,7 +105,9 @@ def _lines(element: Element) -> IntArray:
 
 def _strips(element: Element | None) -> Faces:
     """The triangles of strips, which -1 parts; every other one is turned so that all face one way."""
-    found = None if element is None else next((element.lists[n] for n in _CORNERS if n in element.lists), None)
+    found = (
+        None if element is None else next((element.lists[n] for n in _CORNERS if n in element.lists), None)
+    )
     if element is None or found is None:
         return np.zeros(1, np.int64), np.zeros(0), np.zeros(0, np.int64)
     row, rank = segments(found.start)

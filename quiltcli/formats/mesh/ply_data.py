@@ -208,7 +208,9 @@ def _even_lists(data: bytes, place: int, header: ElementHeader, order: str) -> t
     if (len(data) - place) // kind.itemsize < header.count:
         return None, place
     table = np.frombuffer(data, kind, header.count, place)
-    if any((table[f"n{k}"] != counts[k]).any() for k, prop in enumerate(header.properties) if prop.count_code):
+    if any(
+        (table[f"n{k}"] != counts[k]).any() for k, prop in enumerate(header.properties) if prop.count_code
+    ):
         return None, place
     element = Element(header.name, header.count)
     for k, prop in enumerate(header.properties):

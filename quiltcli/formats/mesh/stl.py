@@ -84,7 +84,10 @@ def _text(data: bytes, path: Path) -> PolygonMesh:
     # Names of solids may be anything; loops may share lines with what stands about them.
     body = _SOLID.sub(lambda found: b" " * len(found[0]), original)
     text = statements(_LEADS.sub(b"\n", body), original)
-    led = {word: _led_by(text.bytes, text.start[text.first[:-1]], text.end[text.first[:-1]], word) for word in _WORDS}
+    led = {
+        word: _led_by(text.bytes, text.start[text.first[:-1]], text.end[text.first[:-1]], word)
+        for word in _WORDS
+    }
     rows = led[b"vertex"]
     sizes = text.sizes[rows] - 1
     flat = parsed_floats(text.spans(rows, 1), int(sizes.sum()))
@@ -94,7 +97,9 @@ def _text(data: bytes, path: Path) -> PolygonMesh:
             for row, words in bad_rows(text, rows.tolist(), 1, 3)
         ]
         problems += [
-            Problem(f"vertex with {sizes[k]} coordinates (expected x y z)", str(path), text.line(int(rows[k])))
+            Problem(
+                f"vertex with {sizes[k]} coordinates (expected x y z)", str(path), text.line(int(rows[k]))
+            )
             for k in np.flatnonzero(sizes < 3)
         ]
         raise_problems(problems or [Problem("the vertices are no numbers", str(path))], str(path))
@@ -118,9 +123,7 @@ def _led_by(letters: NDArray[np.uint8], start: IntArray, end: IntArray, word: by
     return np.flatnonzero(alike)
 
 
-def _loops(
-    vertices: IntArray, led: dict[bytes, IntArray], lines: IntArray
-) -> tuple[IntArray, IntArray]:
+def _loops(vertices: IntArray, led: dict[bytes, IntArray], lines: IntArray) -> tuple[IntArray, IntArray]:
     """How many vertices each facet has, and the line of its first: a loop, or what parts one."""
     marks = np.unique(np.concatenate((led[b"outer"], led[b"facet"], led[b"endloop"], led[b"endfacet"])))
     piece = np.searchsorted(marks, vertices)

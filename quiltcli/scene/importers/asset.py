@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from quiltcli.errors import MeshError, Problem, SceneError
-from quiltcli.formats.mesh import read_mesh
-from quiltcli.geometry import segments
+from quiltcli.formats.mesh import PolygonMesh
+from quiltcli.formats.mesh.coverage import Coverage
+from quiltcli.formats.mesh.read import READERS, read_polygons
 from quiltcli.scene.importers.part import Part
+from quiltcli.scene.importers.polygons import parts_of_polygons
 from quiltcli.scene.importers.trimesh import parts_of, quiet, texture_count, trimesh_scene
-from quiltcli.scene.materials import Surface
 
 SUFFIXES = (".obj", ".ply", ".off", ".stl", ".gltf", ".glb")
-_POLYGONS = (".obj", ".ply", ".off")
-_FACE_COUNT = {
-    ".ply": re.compile(rb"element\s+face\s+(\d+)"),
-    ".off": re.compile(rb"OFF\s+(?:#[^\n]*\s+)*\d+\s+(\d+)"),
-}
 
 
 @dataclass(frozen=True)
 class Asset:
-    """The parts of a mesh file, the textures it wants, and the files it names that are not there."""
+    """What a mesh file brings to a scene.
+
+    Attributes:
+        parts: its parts.
+        textures: how many images its materials want.
+        missing: material files it names that are not there.
+        notices: what else was dropped or assumed, without a name before it.
+        coverage: how the areas of its polygons compare with those of their triangles.
+    """
 
     parts: tuple[Part, ...]
     textures: int
     missing: tuple[str, ...]
+    notices: tuple[str, ...] = ()
+    coverage: Coverage = Coverage()
 
 
 def read_asset(path: Path) -> Asset:
@@ -39,6 +42,40 @@ def read_asset(path: Path) -> Asset:
         SceneError: the file is missing, of an unknown kind, damaged, or holds no triangles.
     """
     _check_file(path)
+    asset = _polygon_asset(path) if path.suffix.lower() in READERS else _trimesh_asset(path)
+    if not any(len(part.triangles) for part in asset.parts):
+        raise SceneError(Problem("holds no triangles", str(path)))
+    return asset
+
+
+def _polygon_asset(path: Path) -> Asset:
+    try:
+        mesh = read_polygons(path)
+    except MeshError as error:
+        raise SceneError(error.problems) from error
+    found = parts_of_polygons(mesh)
+    images = {texture.path for part in found.parts for texture in part.surface.textures}
+    notices = []
+    if found.too_small:
+        notices.append(f"{_faces(found.too_small)} of fewer than 3 corners dropped")
+    if found.coverage.crossing:
+        notices.append(
+            f"{_faces(found.coverage.crossing)} whose outline crosses itself, which no triangles can cover"
+            f"{_place(mesh, found.coverage.first)}"
+        )
+    return Asset(tuple(found.parts), len(images), mesh.missing, tuple(notices), found.coverage)
+
+
+def _faces(count: int) -> str:
+    return f"{count} face" if count == 1 else f"{count} faces"
+
+
+def _place(mesh: PolygonMesh, face: int) -> str:
+    line = int(mesh.lines[face])
+    return f" (face {face + 1}, line {line})" if line else f" (face {face + 1})"
+
+
+def _trimesh_asset(path: Path) -> Asset:
     asked: list[str] = []
     missing: list[str] = []
     try:
@@ -49,14 +86,8 @@ def read_asset(path: Path) -> Asset:
         if any(part.vertices.shape[1:] != (3,) for part in parts):
             raise ValueError("vertices without three coordinates")  # noqa: TRY301 - as if the reader had said so
     except Exception as error:  # whatever the reader meets in a damaged file
-        if path.suffix.lower() not in _POLYGONS:
-            raise _damaged(path, missing) from error
-        parts, textures = [_polygon_part(path)], 0
-    if sum(len(part.triangles) for part in parts) < _promised_faces(path):
-        parts = [_polygon_part(path)]
-    if not any(len(part.triangles) for part in parts):
-        raise SceneError(Problem("holds no triangles", str(path)))
-    return Asset(tuple(parts), textures, tuple(n for n in missing if n.lower().endswith(".mtl")))
+        raise _damaged(path, missing) from error
+    return Asset(tuple(parts), textures, ())
 
 
 def _check_file(path: Path) -> None:
@@ -83,25 +114,3 @@ def _damaged(path: Path, missing: list[str]) -> SceneError:
     buffers = [name for name in missing if not name.endswith(".gltf")]
     reason = f"{buffers[0]!r} is missing beside it" if buffers else "the file is damaged or incomplete"
     return SceneError(Problem(f"cannot be read as {kind}: {reason}", str(path)))
-
-
-def _promised_faces(path: Path) -> int:
-    """Number of faces the header of a PLY or OFF file announces, 0 for other files."""
-    pattern = _FACE_COUNT.get(path.suffix.lower())
-    if pattern is None:
-        return 0
-    with path.open("rb") as file:
-        found = pattern.search(file.read(65536))
-    return int(found[1]) if found else 0
-
-
-def _polygon_part(path: Path) -> Part:
-    """The file by the strict reader of polygons: it takes what trimesh cannot, and says what is wrong."""
-    try:
-        mesh = read_mesh(path)
-    except MeshError as error:
-        raise SceneError(error.problems) from error
-    row, rank = segments(mesh.corner_start)
-    third = np.flatnonzero(rank >= 2)
-    fan = (mesh.corner_start[row[third]], third - 1, third)
-    return Part(mesh.vertices, np.stack([mesh.corners[k] for k in fan], axis=1), None, None, Surface())

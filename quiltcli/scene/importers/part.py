@@ -21,6 +21,7 @@ class Part:
         colors: (V, 3) linear, or None.
         surface: its material.
         mirrored: whether its placement turned the winding inside out.
+        uv: (V, 2) texture coordinates, v up, NaN for a vertex without any, or None.
     """
 
     vertices: FloatArray
@@ -29,6 +30,7 @@ class Part:
     colors: Float32Array | None
     surface: Surface
     mirrored: bool = False
+    uv: FloatArray | None = None
 
 
 def placed(part: Part, matrix: FloatArray) -> Part:

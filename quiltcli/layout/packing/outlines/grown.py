@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from quiltcli.display.polygon import crossing_edges
+from quiltcli.formats.mesh.crossings import crossing_edges
 from quiltcli.geometry import FloatArray
 
 _SQUARE = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
