@@ -180,7 +180,7 @@ def _leading(words: list[str]) -> Iterator[float]:
 def _corners(file: _File, places: Mapping[str, IntArray]) -> _Corners:
     """`f a b c …`, a corner being `v`, `v/vt`, `v//vn` or `v/vt/vn`, negative counting back."""
     text = file.text
-    rows = np.union1d(text.led_by(b"f"), text.led_by(b"fo"))
+    rows = np.sort(np.concatenate((text.led_by(b"f"), text.led_by(b"fo"))))
     start = ragged(text.sizes[rows] - 1)
     row, rank = segments(start)
     word = text.first[rows][row] + 1 + rank
@@ -300,7 +300,7 @@ def _variant(corners: _Corners, normals: int) -> IntArray | None:
 
 def _names(file: _File, faces: IntArray) -> tuple[str, ...]:
     """Names of faces from the `o` or `g` they stand under."""
-    rows = np.union1d(file.text.led_by(b"o"), file.text.led_by(b"g"))
+    rows = np.sort(np.concatenate((file.text.led_by(b"o"), file.text.led_by(b"g"))))
     names = ["", *(without_comment(_rest(file, row)) for row in rows.tolist())]
     return one_face_groups(np.searchsorted(rows, faces), names)
 

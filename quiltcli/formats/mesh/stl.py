@@ -22,8 +22,8 @@ from quiltcli.geometry import Float32Array, IntArray
 
 _HEADER = 80
 _FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("spare", "<u2")])
-_SOLID = re.compile(rb"^[ \t]*(end[ \t]*)?solid\b[^\n]*", re.IGNORECASE | re.MULTILINE)
-_LEADS = re.compile(rb"[ \t](?=(vertex|facet|outer|endloop|endfacet)\b)", re.IGNORECASE)
+_SOLID = re.compile(rb"[ \t]*(end[ \t]*)?solid\b[^\n]*")
+_LEADS = re.compile(rb"[ \t](?=(vertex|facet|outer|endloop|endfacet)\b)")
 _WORDS = (b"vertex", b"outer", b"endloop", b"facet", b"endfacet")
 
 
@@ -81,13 +81,12 @@ def _colors(spare: IntArray, header: bytes) -> Float32Array | None:
 
 def _text(data: bytes, path: Path) -> PolygonMesh:
     original = plain_text(data)
-    # Names of solids may be anything; loops may share lines with what stands about them.
-    body = _SOLID.sub(lambda found: b" " * len(found[0]), original)
-    text = statements(_LEADS.sub(b"\n", body), original)
-    led = {
-        word: _led_by(text.bytes, text.start[text.first[:-1]], text.end[text.first[:-1]], word)
-        for word in _WORDS
-    }
+    body = _without_names(original.lower())
+    text = statements(body, original)
+    if len(text.led_by(b"vertex")) < body.count(b"vertex"):
+        # Loops share lines with what stands about them.
+        text = statements(_LEADS.sub(b"\n", body), original)
+    led = {word: text.led_by(word) for word in _WORDS}
     rows = led[b"vertex"]
     sizes = text.sizes[rows] - 1
     flat = parsed_floats(text.spans(rows, 1), int(sizes.sum()))
@@ -115,17 +114,23 @@ def _text(data: bytes, path: Path) -> PolygonMesh:
     return _mesh(vertices, counts, lines, path, None, text.lines(rows))
 
 
-def _led_by(letters: NDArray[np.uint8], start: IntArray, end: IntArray, word: bytes) -> IntArray:
-    """Statements that begin with a word in any case."""
-    alike = end - start == len(word)
-    for place, letter in enumerate(word):
-        alike &= letters[np.minimum(start + place, len(letters) - 1)] | 32 == letter
-    return np.flatnonzero(alike)
+def _without_names(text: bytes) -> bytes:
+    """The text with the lines of `solid` and `endsolid` blank: names may be anything."""
+    result = bytearray(text)
+    place = text.find(b"solid")
+    while place >= 0:
+        begin = text.rfind(b"\n", 0, place) + 1
+        end = text.find(b"\n", place)
+        end = len(text) if end < 0 else end
+        if _SOLID.fullmatch(text, begin, end):
+            result[begin:end] = b" " * (end - begin)
+        place = text.find(b"solid", end)
+    return bytes(result)
 
 
 def _loops(vertices: IntArray, led: dict[bytes, IntArray], lines: IntArray) -> tuple[IntArray, IntArray]:
     """How many vertices each facet has, and the line of its first: a loop, or what parts one."""
-    marks = np.unique(np.concatenate((led[b"outer"], led[b"facet"], led[b"endloop"], led[b"endfacet"])))
+    marks = np.sort(np.concatenate((led[b"outer"], led[b"facet"], led[b"endloop"], led[b"endfacet"])))
     piece = np.searchsorted(marks, vertices)
     _, first, counts = np.unique(piece, return_index=True, return_counts=True)
     if not len(marks) and len(vertices) % 3 == 0:

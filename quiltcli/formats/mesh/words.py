@@ -121,12 +121,18 @@ class Statements:
 
     def led_by(self, keyword: bytes) -> IntArray:
         """Statements whose first word is `keyword`, ascending."""
+        start, length, letter = self._leads
+        found = np.flatnonzero((length == len(keyword)) & (letter == keyword[0]))
+        for place in range(1, len(keyword)):
+            found = found[self.bytes[start[found] + place] == keyword[place]]
+        return found
+
+    @cached_property
+    def _leads(self) -> tuple[IntArray, IntArray, NDArray[np.uint8]]:
+        """Where the first word (S,) of each statement begins, how long it is, and its first letter."""
         lead = self.first[:-1]
-        alike = self.end[lead] - self.start[lead] == len(keyword)
-        for place, letter in enumerate(keyword):
-            # Statements that are already out may be shorter than the keyword; look no further than them.
-            alike &= self.bytes[np.minimum(self.start[lead] + place, len(self.text) - 1)] == letter
-        return np.flatnonzero(alike)
+        start = self.start[lead]
+        return start, self.end[lead] - start, self.bytes[start]
 
     def spans(self, statements: IntArray, skip: int) -> bytes:
         """The text of these ascending statements without their first `skip` words, joined by blanks.
