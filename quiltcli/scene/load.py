@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from quiltcli.errors import Problem, SceneError, raise_all
-from quiltcli.formats.mesh.coverage import Coverage
+from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import Float32Array, FloatArray, normalized
 from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
@@ -55,7 +55,7 @@ class _Gathered:
     materials: list[list[int]] = field(default_factory=list)
     surfaces: dict[Surface, int] = field(default_factory=dict)
     textures: int = 0
-    coverage: Coverage = Coverage()
+    coverage: Coverage = NOTHING
     notices: list[str] = field(default_factory=list)
 
     def add(self, name: str, asset: Asset, baked: Baked, surfaces: Sequence[Surface]) -> None:

@@ -59,7 +59,7 @@ class Surface:
     textures: tuple[Texture, ...] = ()
 
     def overridden(self, given: Mapping[str, Any]) -> Surface:
-        """This surface with the keys of `given` in place of its own, and without the images that vary those."""
+        """This surface with the keys of `given` in place of its own, without images that vary those."""
         changes: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
         changes.setdefault("textures", tuple(t for t in self.textures if t.role not in changes))
         return replace(self, **changes)

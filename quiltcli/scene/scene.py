@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quiltcli.formats.mesh.coverage import Coverage
+from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, cross, dot, normalized
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class Scene:
     background: Float32Array
     notices: tuple[str, ...]
     uv: FloatArray | None = None
-    coverage: Coverage = Coverage()
+    coverage: Coverage = NOTHING
 
     @cached_property
     def planes(self) -> FloatArray:

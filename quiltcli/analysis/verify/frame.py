@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from quiltcli.analysis.verify.areas import Areas, display_coverage
 from quiltcli.analysis.verify.images import Images, find_images
 from quiltcli.analysis.verify.pixels import Trial, check_pixels
 from quiltcli.analysis.verify.sample import every_pixel, sampled_pixels
@@ -49,6 +50,7 @@ class Verdict:
         bleed: pixels in their bleed.
         outside: pixels of no lit facet that show something all the same.
         seams: the seams between facets.
+        areas: polygons of the display and the scene against their triangles.
         eye: `left` or `right`, empty where there is one eye.
         viewer: name of whoever looks, empty where there is nobody else.
     """
@@ -61,18 +63,20 @@ class Verdict:
     bleed: Tally
     outside: int
     seams: Seams
+    areas: Areas
     eye: str = ""
     viewer: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether all tolerances are met."""
-        return not (self.inside.failures or self.bleed.failures or self.outside or self.seams.failures)
+        pixels = self.inside.failures or self.bleed.failures or self.outside
+        return not (pixels or self.seams.failures or self.areas.failures)
 
     @property
     def words(self) -> str:
         """The verdict in a few words."""
-        if not self.lit:
+        if not self.lit and self.passed:
             return "nothing to verify, no facet is lit"
         return "within tolerance" if self.passed else "OUT OF TOLERANCE"
 
@@ -95,6 +99,7 @@ class Verdict:
             "bleed": self.bleed.as_json(),
             "outside": self.outside,
             "seams": self.seams.as_json(),
+            "areas": self.areas.as_json(),
             "faults": [fault.as_json() for fault in self.faults],
             "passed": self.passed,
         }
@@ -197,6 +202,7 @@ def verify_images(
         bleed=bled,
         outside=_shown_outside(stage, everybody or (viewer,), images),
         seams=check_seams(trial, points),
+        areas=Areas(display_coverage(stage.facets), stage.scene.coverage),
     )
 
 

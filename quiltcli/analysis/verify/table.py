@@ -30,6 +30,11 @@ def verdict_rows(verdict: Verdict) -> list[tuple[str, ...]]:
         rows.append((name, f"{seams.counts[key]:,}", "", _mark(seams.failures * (key == "seam"))))
     rows.append(("seam jump, greatest", f"{seams.most:.3g} m", "", ""))
     rows.append(("  share of its tolerance", f"{100 * seams.most_share:.1f} %", "", ""))
+    for name, found in (("facets", verdict.areas.display), ("scene faces", verdict.areas.scene)):
+        rows.append((f"{name} of over 3 corners", f"{found.faces:,}", "", ""))
+        rows.append(("  not covered by their triangles", f"{found.wrong:,}", "", _mark(found.wrong)))
+        if found.crossing:
+            rows.append(("  crossing themselves: no verdict", f"{found.crossing:,}", "", ""))
     return rows
 
 

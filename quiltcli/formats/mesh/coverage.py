@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,9 +49,8 @@ class Coverage:
         )
 
 
-def total(coverages: Iterable[Coverage]) -> Coverage:
-    """All of them together."""
-    return sum(coverages, Coverage())
+NOTHING = Coverage()
+"""No polygon compared."""
 
 
 def coverage(points: FloatArray, start: IntArray, triangles: Triangles) -> Coverage:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from itertools import pairwise
 
 import numpy as np
 
@@ -138,7 +139,7 @@ class _Clipper:
     def fan(self) -> list[Triangle]:
         """All that is left as a fan."""
         rest = np.flatnonzero(self.alive).tolist()
-        return [(rest[0], a, b) for a, b in zip(rest[1:-1], rest[2:], strict=True)]
+        return [(rest[0], a, b) for a, b in pairwise(rest[1:])]
 
     def _held(self, corner: int, margin: float) -> IntArray:
         """Other corners in the triangle of an ear or, by a negative margin, on its outline.

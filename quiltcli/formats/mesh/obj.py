@@ -117,7 +117,7 @@ def _vertices(file: _File, rows: IntArray) -> tuple[FloatArray, Float32Array | N
     colors = None
     if colored.any():
         given = _columns(flat, start, (3, 4, 5))
-        scale = 255.0 if np.nanmax(given[colored], initial=0.0) > 1 else 1.0
+        scale = 255.0 if np.nan_to_num(given[colored]).max() > 1 else 1.0
         colors = np.ones((len(rows), 3), np.float32)
         colors[colored] = linear_from_srgb(given[colored] / scale)
     return _columns(flat, start, (0, 1, 2)), colors
@@ -217,15 +217,15 @@ def _fields(file: _File, rows: IntArray, word: IntArray) -> IntArray | None:
     text = file.text
     if not len(word):
         return np.zeros((0, 3), np.int64)
-    slashes = np.flatnonzero(text.bytes == _SLASH)
+    slashes = np.flatnonzero(text.letters == _SLASH)
     owner = np.searchsorted(text.start[word], slashes, "right") - 1
     inside = (owner >= 0) & (slashes < text.end[word][owner])
     slashes, owner = slashes[inside], owner[inside]
     per_word = np.bincount(owner, minlength=len(word))
-    if per_word.max() > 2 or (text.bytes[text.start[word]] == _SLASH).any():
+    if per_word.max() > 2 or (text.letters[text.start[word]] == _SLASH).any():
         return None
     field_of = np.arange(len(owner)) - ragged(per_word)[owner] + 1
-    behind = text.bytes[slashes + 1]
+    behind = text.letters[slashes + 1]
     filled = (behind != _SLASH) & (behind > _BLANK)
     count = int(np.count_nonzero(filled))
     numbers = parsed_integers(text.spans(rows, 1).replace(b"/", b" "), len(word) + count)

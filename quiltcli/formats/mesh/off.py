@@ -43,7 +43,6 @@ class _Header:
         faces: likewise.
         row: statement with the first vertex.
         word: word with which the first vertex begins.
-        line: of the counts.
     """
 
     texture: bool
@@ -57,7 +56,7 @@ class _Header:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Ragged rows of numbers: row k is flat[start[k] : start[k + 1]], on a line, of words from a first one."""
+    """Rows of numbers, flat[start[k] : start[k + 1]], their lines, and the first word of each."""
 
     flat: FloatArray
     start: IntArray
@@ -130,8 +129,8 @@ def _header(text: Statements, path: str) -> _Header:
         message = f"found {shown!r} (expected the counts of vertices, faces and edges)"
         raise _error(path, message, text.line(row))
     used = len(counts) - len(glued)
-    prefixes = (False, False, False) if found is None else tuple(found[k] is not None for k in (1, 2, 3))
-    return _Header(*prefixes, int(counts[0]), int(counts[1]), row + 1, word + used)
+    texture, colored, normals = (found is not None and found[k] is not None for k in (1, 2, 3))
+    return _Header(texture, colored, normals, int(counts[0]), int(counts[1]), row + 1, word + used)
 
 
 def _error(path: str, message: str, line: int = 0) -> MeshError:
@@ -236,7 +235,7 @@ def _vertex_colors(text: Statements, vertices: _Rows, header: _Header) -> Float3
     if not header.colored or not len(spare) or spare.min() < 3:
         return None
     columns = first + np.arange(3)
-    points = _with_point(text, vertices.first_word[:, None] + columns).any()
+    points = bool(_with_point(text, vertices.first_word[:, None] + columns).any())
     return linear_from_srgb(_scaled(vertices.columns(columns), np.full(len(spare), points)))
 
 
@@ -251,7 +250,7 @@ def _face_colors(text: Statements, faces: _Rows) -> Float32Array | None:
         return None
     columns = 1 + size[colored, None] + np.arange(3)
     given = faces.flat[faces.start[colored, None] + columns]
-    points = _with_point(text, faces.first_word[colored, None] + columns).any(axis=1)
+    points: BoolArray = np.logical_or.reduce(_with_point(text, faces.first_word[colored, None] + columns), 1)
     result = np.ones((len(size), 3), np.float32)
     result[colored] = linear_from_srgb(_scaled(given, points))
     return result
@@ -267,7 +266,7 @@ def _scaled(given: FloatArray, fractions: BoolArray) -> FloatArray:
 
 def _with_point(text: Statements, words: IntArray) -> BoolArray:
     """Which words are written with a decimal point."""
-    points = np.flatnonzero(text.bytes == ord("."))
+    points = np.flatnonzero(text.letters == ord("."))
     before = np.searchsorted(points, text.start[words])
     result: BoolArray = np.searchsorted(points, text.end[words]) > before
     return result

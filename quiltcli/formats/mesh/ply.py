@@ -10,7 +10,7 @@ passed over.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _CORNERS = ("vertex_indices", "vertex_index")
 _LARGEST = {"b": 255, "B": 255, "h": 65535, "H": 65535}
-Faces: TypeAlias = tuple[IntArray, NDArray[np.generic], IntArray]
+Faces: TypeAlias = tuple[IntArray, NDArray[Any], IntArray]
 
 
 def read_ply(data: bytes, path: Path) -> PolygonMesh:
@@ -132,9 +132,7 @@ def _joined(faces: Faces, strips: Faces) -> Faces:
     return start, np.concatenate((faces[1], strips[1])), np.concatenate((faces[2], strips[2]))
 
 
-def _checked(
-    named: NDArray[np.generic], start: IntArray, lines: IntArray, count: int, path: Path
-) -> IntArray:
+def _checked(named: NDArray[Any], start: IntArray, lines: IntArray, count: int, path: Path) -> IntArray:
     """Vertex numbers (C,) that are there.
 
     Raises:
@@ -191,10 +189,9 @@ def _linear(element: Element | None) -> Float32Array | None:
     if colors is None or element is None:
         return None
     code = element.codes[names[0]]
-    if code in "fd":
-        scale = 255 if np.nanmax(colors, initial=0.0) > 1 else 1
-    else:
-        scale = _LARGEST.get(code, 255)
+    scale = _LARGEST.get(code, 255)
+    if code in "fd" and np.nan_to_num(colors).max(initial=0.0) <= 1:
+        scale = 1
     return linear_from_srgb(colors / scale)
 
 

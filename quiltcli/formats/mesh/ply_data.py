@@ -14,7 +14,7 @@ from quiltcli.formats.mesh.ply_header import ElementHeader, Header, Property, St
 from quiltcli.formats.mesh.words import Statements, bad_rows, parsed_floats, plain_text, ragged, statements
 from quiltcli.geometry import FloatArray, IntArray
 
-Column = NDArray[np.generic]
+Column = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,8 @@ def _counts(written: FloatArray, element: Element) -> IntArray:
         row = int(np.argmin(good))
         line = 0 if element.lines is None else int(element.lines[row])
         raise StopReadingError(
-            f"row {row + 1} of {element.name} has a list of {written[row]:g} numbers (expected a whole count)",
+            f"row {row + 1} of {element.name} has a list of {written[row]:g} numbers "
+            "(expected a whole count)",
             line,
         )
     return written.astype(np.int64)
@@ -157,7 +158,8 @@ def _places(begin: IntArray, offsets: IntArray, size: int = 1) -> IntArray:
     The offsets (n+1,) are those of the lists when joined.
     """
     rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], np.diff(offsets))
-    return np.repeat(begin, np.diff(offsets)) + size * rank
+    result: IntArray = np.repeat(begin, np.diff(offsets)) + size * rank
+    return result
 
 
 def _binary(data: bytes, header: Header, wanted: Sequence[ElementHeader]) -> list[Element]:
@@ -285,7 +287,7 @@ def _count(unpack: Any, data: bytes, place: int, row: int, header: ElementHeader
         _runs_out(data, row, header)
     if not 0 <= written < 2**53 or written % 1:
         raise StopReadingError(
-            f"row {row + 1} of {header.name} has a list of {written} numbers at byte {place}"
+            f"row {row + 1} of {header.name} has a list of {written:g} numbers at byte {place}"
         )
     return int(written)
 

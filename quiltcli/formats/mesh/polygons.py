@@ -97,9 +97,9 @@ def triangulate(points: FloatArray, start: IntArray) -> Triangles:
         ears = ear_clip(points[start[face] : start[face + 1]])
         cut = start[face] + np.array(ears, np.int64).reshape(-1, 3)
         found.append(Triangles(cut, np.full(len(ears), face)))
-    face = np.concatenate([triangles.face for triangles in found])
-    order = np.argsort(face, kind="stable")
-    return Triangles(np.concatenate([triangles.corners for triangles in found])[order], face[order])
+    owner = np.concatenate([triangles.face for triangles in found])
+    order = np.argsort(owner, kind="stable")
+    return Triangles(np.concatenate([triangles.corners for triangles in found])[order], owner[order])
 
 
 def some_polygons(start: IntArray, faces: IntArray) -> tuple[IntArray, IntArray]:

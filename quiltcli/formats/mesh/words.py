@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,7 @@ class Statements:
         return np.diff(self.first)
 
     @cached_property
-    def bytes(self) -> NDArray[np.uint8]:
+    def letters(self) -> NDArray[np.uint8]:
         """The text as an array."""
         return np.frombuffer(self.text, np.uint8)
 
@@ -124,7 +125,7 @@ class Statements:
         start, length, letter = self._leads
         found = np.flatnonzero((length == len(keyword)) & (letter == keyword[0]))
         for place in range(1, len(keyword)):
-            found = found[self.bytes[start[found] + place] == keyword[place]]
+            found = found[self.letters[start[found] + place] == keyword[place]]
         return found
 
     @cached_property
@@ -132,7 +133,7 @@ class Statements:
         """Where the first word (S,) of each statement begins, how long it is, and its first letter."""
         lead = self.first[:-1]
         start = self.start[lead]
-        return start, self.end[lead] - start, self.bytes[start]
+        return start, self.end[lead] - start, self.letters[start]
 
     def spans(self, statements: IntArray, skip: int) -> bytes:
         """The text of these ascending statements without their first `skip` words, joined by blanks.
@@ -153,7 +154,7 @@ class Statements:
 
     def _without(self, statements: IntArray, skip: int) -> bytes:
         """The text with the first `skip` words of the statements blank."""
-        text = self.bytes.copy()
+        text = self.letters.copy()
         for rank in range(skip):
             word = self.first[statements] + rank
             start, length = self.start[word], self.end[word] - self.start[word]
@@ -190,22 +191,24 @@ def parsed_floats(text: bytes, count: int) -> FloatArray | None:
 
     A number beyond float64 is infinite.
     """
-    return _parsed(text, count, np.float64)
+    found = _parsed(text, count, np.float64)
+    return None if found is None else found.astype(np.float64, copy=False)
 
 
 def parsed_integers(text: bytes, count: int) -> IntArray | None:
     """Likewise whole numbers; one beyond int64 becomes the last one there is."""
-    return _parsed(text, count, np.int64)
+    found = _parsed(text, count, np.int64)
+    return None if found is None else found.astype(np.int64, copy=False)
 
 
-def _parsed(text: bytes, count: int, kind: type) -> NDArray[np.generic] | None:
+def _parsed(text: bytes, count: int, kind: type) -> NDArray[Any] | None:
     if not count:
         return np.zeros(0, kind)
     try:
         # Text that is not read to its end is an error of NumPy's, or a warning that is to become one.
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            numbers = np.fromstring(text, dtype=kind, sep=" ")
+            numbers: NDArray[Any] = np.fromstring(text, dtype=kind, sep=" ")
     except (ValueError, DeprecationWarning):
         return None
     return numbers if len(numbers) == count else None

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from quiltcli.errors import MeshError, Problem, SceneError
 from quiltcli.formats.mesh import PolygonMesh
-from quiltcli.formats.mesh.coverage import Coverage
+from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.formats.mesh.read import READERS, read_polygons
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.importers.polygons import parts_of_polygons
@@ -32,7 +32,7 @@ class Asset:
     textures: int
     missing: tuple[str, ...]
     notices: tuple[str, ...] = ()
-    coverage: Coverage = Coverage()
+    coverage: Coverage = NOTHING
 
 
 def read_asset(path: Path) -> Asset:
