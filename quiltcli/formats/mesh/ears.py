@@ -12,6 +12,9 @@ from quiltcli.geometry import BoolArray, FloatArray, IntArray
 STRAIGHT = 1e-9
 """A turn this much smaller than its two edges is straight: what float64 leaves of a straight line."""
 
+# Ears looked at, for every corner, in outlines that touch or cross themselves, before it is given up.
+_LAST_RESORTS = 5
+
 Triangle = tuple[int, int, int]
 
 
@@ -99,7 +102,8 @@ class _Clipper:
         self._near = (size * STRAIGHT) ** 2
         # Corners by x: only those in an ear's range of x can lie in it.
         self._order = np.argsort(points[:, 0], kind="stable")
-        self._x = points[self._order, 0]
+        self._x, self._y = points[self._order].T
+        self._tries = _LAST_RESORTS * count
 
     def triangle(self, corner: int) -> Triangle:
         """What cutting off a corner takes away."""
@@ -150,7 +154,8 @@ class _Clipper:
         ear = self.points[list(self.triangle(corner))]
         first = np.searchsorted(self._x, ear[:, 0].min(), "left")
         last = np.searchsorted(self._x, ear[:, 0].max(), "right")
-        others = self._order[first:last]
+        near = (self._y[first:last] >= ear[:, 1].min()) & (self._y[first:last] <= ear[:, 1].max())
+        others = self._order[first:last][near]
         others = others[self.alive[others]]
         others = others[sides(ear, self.points[others]) >= margin]
         step = self.points[others][:, None] - ear
@@ -160,6 +165,9 @@ class _Clipper:
     def _touched(self) -> int | None:
         """The widest ear that others touch from outside, when there is no better one."""
         for corner in self._widest():
+            self._tries -= 1
+            if self._tries < 0:
+                return None
             if not len(self._held(corner, self._area)):
                 return corner
         return None

@@ -162,7 +162,7 @@ def _by_lines(text: Statements, header: _Header, path: str) -> tuple[_Rows, _Row
         raise _error(path, message, int(vertices.lines[row]))
     faces = _lines_of(text, header.row + header.vertices, header.faces, "faces", path)
     size = faces.flat[faces.start[:-1]]
-    for row in np.flatnonzero(~((size >= 0) & (size % 1 == 0) & (size < faces.counts))):
+    for row in np.flatnonzero(~((size >= 0) & (np.floor(size) == size) & (size < faces.counts))):
         shown = " ".join(text.words(header.row + header.vertices + int(row)))[:60]
         message = f"face {row + 1} is {shown!r} (expected a count and that many vertex numbers)"
         raise _error(path, message, int(faces.lines[row]))
@@ -195,7 +195,7 @@ def _loose(text: Statements, header: _Header) -> tuple[_Rows, _Rows] | None:
         return None
     starts = [header.vertices * width]
     for _ in range(min(header.faces, count)):
-        if starts[-1] >= count or not (flat[starts[-1]] >= 0 and flat[starts[-1]] % 1 == 0):
+        if starts[-1] >= count or not 0 <= np.floor(flat[starts[-1]]) == flat[starts[-1]]:
             return None
         starts.append(starts[-1] + 1 + int(min(flat[starts[-1]], count)))
     if len(starts) != header.faces + 1 or starts[-1] != count:
@@ -218,7 +218,7 @@ def _corners(text: Statements, faces: _Rows, header: _Header, path: str) -> tupl
     place = faces.start[row] + 1 + rank
     named = faces.flat[place]
     outside: BoolArray = ~((named >= 0) & (named < header.vertices))
-    outside |= np.where(outside, 0, named) % 1 != 0
+    outside |= np.floor(named) != named
 
     def written(corner: int) -> str:
         return text.word(int(faces.first_word[row[corner]] + 1 + rank[corner]))

@@ -140,7 +140,7 @@ def _checked(named: NDArray[Any], start: IntArray, lines: IntArray, count: int, 
     """
     outside: BoolArray = ~((named >= 0) & (named < count))  # true for NaN
     if named.dtype.kind == "f":
-        outside |= np.where(outside, 0, named) % 1 != 0
+        outside |= np.floor(named) != named
 
     def written(corner: int) -> str:
         value = named[corner]

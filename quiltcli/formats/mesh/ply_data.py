@@ -139,8 +139,7 @@ def _long_enough(need: IntArray, end: IntArray, start: IntArray, element: Elemen
 
 def _counts(written: FloatArray, element: Element) -> IntArray:
     """Lengths of lists, of which none is negative, broken, infinite or not a number."""
-    good = (written >= 0) & (written < 2**53)
-    good[good] &= written[good] % 1 == 0
+    good = (written >= 0) & (written < 2**53) & (np.floor(written) == written)
     if not good.all():
         row = int(np.argmin(good))
         line = 0 if element.lines is None else int(element.lines[row])

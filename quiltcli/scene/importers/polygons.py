@@ -34,7 +34,8 @@ def parts_of_polygons(mesh: PolygonMesh) -> PolygonParts:
     triangles, covered = _triangles(mesh, np.flatnonzero(counts >= 3))
     vertices = mesh.vertices
     if mesh.single:
-        vertices = vertices.astype(np.float32).astype(np.float64)
+        with np.errstate(over="ignore"):
+            vertices = vertices.astype(np.float32).astype(np.float64)
     material = np.full(mesh.count, -1, np.int64) if mesh.material is None else mesh.material
     parts = []
     owner = material[triangles.face]
