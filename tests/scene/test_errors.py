@@ -60,7 +60,12 @@ def test_empty(tmp_path, suffix):
     assert found == f"m.{suffix}: the file is empty (expected a mesh)"
 
 
-@pytest.mark.parametrize("suffix", ["stl", "glb", "gltf"])
+def test_cut_off_binary_stl(tmp_path):
+    found = message(exported(tmp_path, "m.stl", 0.6))
+    assert found == "m.stl: truncated: 80 triangles need 4084 bytes, 2450 are there"
+
+
+@pytest.mark.parametrize("suffix", ["glb", "gltf"])
 def test_cut_off(tmp_path, suffix):
     found = message(exported(tmp_path, f"m.{suffix}", 0.6))
     assert found == f"m.{suffix}: cannot be read as {suffix.upper()}: the file is damaged or incomplete"

@@ -254,7 +254,8 @@ CASES = [
     Case("scene: lines", [swap(BALL, "v 0 0.5 -1", "v 0 -0.5 -1"), swap(BALL, "v 0 0 -0.2", "v 2 -0.5 -1")], [],
          "scene.yaml:3:22: objects[0].mesh: ball.obj: every triangle is without area or not finite"),
     Case("scene: truncated stl", [raw("ball.stl", PLY + b''), swap(SCENE, BALL, "ball.stl")], [],
-         "scene.yaml:3:22: objects[0].mesh: ball.stl: holds no triangles"),
+         "scene.yaml:3:22: objects[0].mesh: ball.stl: found 'ply' "
+         "(expected text that begins with solid, or a binary header of 84 bytes)"),
     Case("scene: truncated glb", [raw("ball.glb", b'glTF\x02\x00\x00\x00\xff\x00\x00\x00'), swap(SCENE, BALL, "ball.glb")], [],
          "scene.yaml:3:22: objects[0].mesh: ball.glb: cannot be read as GLB: the file is damaged or incomplete"),
     Case("scene: no objects", [put(SCENE, "quilt_scene: 1\nobjects: []\n")], [],

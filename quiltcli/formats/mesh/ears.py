@@ -103,6 +103,7 @@ class _Clipper:
         # Corners by x: only those in an ear's range of x can lie in it.
         self._order = np.argsort(points[:, 0], kind="stable")
         self._x, self._y = points[self._order].T
+        self._spikes = self._flat(np.arange(count), back=True)
         self._tries = _LAST_RESORTS * count
 
     def triangle(self, corner: int) -> Triangle:
@@ -111,6 +112,11 @@ class _Clipper:
 
     def best(self) -> int | None:
         """The corner to cut off: the widest ear, or one that takes no area with it; None without any."""
+        # Spikes first: both sides of one lie on the outline, where nothing could tell inside from outside.
+        while self._spikes:
+            corner = self._spikes.pop()
+            if self.alive[corner] and self._flat(np.array([corner]), back=True):
+                return corner
         while self._heap and self._heap[0][0] < -STRAIGHT:
             _, corner, version = heapq.heappop(self._heap)
             if not self.alive[corner] or version != self._version[corner]:
@@ -119,10 +125,7 @@ class _Clipper:
             if not len(held):
                 return corner
             self._waiting.setdefault(int(held[0]), []).append(corner)
-        for last_resort in (self._spike, self._touched, self._straight):
-            if (found := last_resort()) is not None:
-                return found
-        return None
+        return self._straight() if (touched := self._touched()) is None else touched
 
     def cut(self, corner: int) -> None:
         """Take a corner out of the polygon."""
@@ -134,6 +137,7 @@ class _Clipper:
         self.sine[around] = ear_sines(
             self.points[self.before[around]], self.points[around], self.points[self.after[around]]
         )
+        self._spikes += self._flat(around, back=True)
         for changed in (a, c, *self._waiting.pop(corner, ())):
             if self.alive[changed]:
                 self._version[changed] += 1
@@ -172,18 +176,18 @@ class _Clipper:
                 return corner
         return None
 
-    def _spike(self, *, straight: bool = False) -> int | None:
-        """A corner without area: where the outline turns back on itself or, if `straight`, runs on."""
-        corners = np.flatnonzero(self.alive)
+    def _flat(self, corners: IntArray, *, back: bool) -> list[int]:
+        """Which corners take no area with them; with `back`, only those where the outline turns back."""
         a, b, c = self.points[self.before[corners]], self.points[corners], self.points[self.after[corners]]
         flat = np.abs(corner_sine(a, b, c)) <= STRAIGHT
-        if not straight:
+        if back:
             flat &= ((b - a) * (c - b)).sum(axis=1) <= 0
-        chosen = corners[flat]
-        return int(chosen[0]) if len(chosen) else None
+        found: list[int] = corners[flat].tolist()
+        return found
 
     def _straight(self) -> int | None:
-        return self._spike(straight=True)
+        found = self._flat(np.flatnonzero(self.alive), back=False)
+        return found[0] if found else None
 
     def _widest(self) -> list[int]:
         corners = np.flatnonzero(self.alive & (self.sine > STRAIGHT))

@@ -256,7 +256,7 @@ def _check_vertices(
         written = file.text.word(word[corner]).partition("/")[0]
         if given[corner] == 0:
             file.problem(f"{name} 0 (numbers start at 1, or at -1 from the end)", line)
-        elif given[corner] < 0:
+        elif written.startswith("-"):
             file.problem(f"{name} {written}, but only {before[corner]} come before it", line)
         else:
             file.problem(f"{name} {written} (expected 1 to {count})", line)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ _TYPES = {
     "float": "f", "double": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H",
     "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
+_ENDING = re.compile(rb"\r\n?|\n")
 _MOST_DIGITS = 18  # what a count in int64 can have
 _SHOWN = 60
 
@@ -66,8 +68,8 @@ def read_header(data: bytes) -> Header:
         StopReadingError: with the line.
     """
     # The first line tells how lines end; binary data may begin with either character.
-    head = data[: data.find(b"\n") + 1] or data
-    ending = b"\r\n" if b"\r\n" in head else b"\r" if b"\r" in head else b"\n"
+    found = _ENDING.search(data)
+    ending = found[0] if found else b"\n"
     order: str | None = None
     elements: list[ElementHeader] = []
     texture = ""

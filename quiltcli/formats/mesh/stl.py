@@ -41,7 +41,7 @@ def _is_text(data: bytes) -> bool:
     if _HEADER + 4 + _FACET.itemsize * _count(data) == len(data):
         return False
     text = plain_text(data[:4000]).lower()
-    return b"\0" not in text and (b"facet" in text or b"vertex" in text or text.lstrip().startswith(b"solid"))
+    return b"\0" not in text and (b"facet" in text or text.lstrip().startswith(b"solid"))
 
 
 def _count(data: bytes) -> int:
@@ -51,9 +51,10 @@ def _count(data: bytes) -> int:
 
 def _binary(data: bytes, path: Path) -> PolygonMesh:
     count, begin = _count(data), _HEADER + 4
-    if count < 0:
-        found = f"{len(data)} bytes that are neither text nor a binary header of {begin}"
-        raise MeshError(Problem(f"found {found} (expected STL)", str(path)))
+    if count < 0 or (data[:begin].isascii() and data[:begin].decode().replace("\n", " ").isprintable()):
+        found = repr(data.partition(b"\n")[0][:20].decode("latin-1"))
+        expected = f"text that begins with solid, or a binary header of {begin} bytes"
+        raise MeshError(Problem(f"found {found} (expected {expected})", str(path)))
     need = begin + count * _FACET.itemsize
     if need > len(data):
         raise MeshError(
