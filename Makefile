@@ -47,9 +47,10 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(DOCS)/sphere_eye.png --size 960x720 --supersample 3
 	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(DOCS)/sphere_aside.png --size 960x720 --supersample 3 --from 0.9,0.6,1.0 --edges
 	$(QUILT) simulate scenes/demo.yaml -f 4 -o $(DOCS)/box_third.png --size 960x600 --supersample 3 --third-person
+	$(QUILT) simulate scenes/demo_stereo.yaml -f 6 -o $(DOCS)/stereo-glasses.png --size 720x540 --supersample 3 --glasses half-color
 	$(QUILT) render scenes/demo.yaml -f 6 --overwrite
 	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(DOCS)/box_quilt.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/stereo-*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2
