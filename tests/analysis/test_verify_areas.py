@@ -16,7 +16,8 @@ def job(tmp_path, faces=((0, 1, 2, 3, 4, 5, 6, 7),)):
 
 
 def test_areas_of_polygons_and_triangles_agree(tmp_path):
-    verdict = verify(job(tmp_path))[0]
+    [found] = verify(job(tmp_path))
+    verdict = found.verdict
     assert verdict.passed
     assert verdict.as_json()["areas"] == {
         "display": {
@@ -37,7 +38,8 @@ def test_a_fan_across_a_notch_fails(tmp_path, monkeypatch):
         return polygons._fans(start, polygons.np.arange(len(start) - 1))
 
     monkeypatch.setattr(importer, "triangulate", fans)
-    verdict = verify(job(tmp_path))[0]
+    [found] = verify(job(tmp_path))
+    verdict = found.verdict
     assert verdict.inside.failures == 0
     assert not verdict.passed
     assert ("  not covered by their triangles", "1", "", "FAIL") in verdict_rows(verdict)
@@ -45,6 +47,7 @@ def test_a_fan_across_a_notch_fails(tmp_path, monkeypatch):
 
 
 def test_outlines_that_cross_give_no_verdict(tmp_path):
-    verdict = verify(job(tmp_path, ((0, 1, 2, 3, 4, 5, 6, 7), (7, 1, 2, 5))))[0]
+    [found] = verify(job(tmp_path, ((0, 1, 2, 3, 4, 5, 6, 7), (7, 1, 2, 5))))
+    verdict = found.verdict
     assert verdict.passed
     assert ("  crossing themselves: no verdict", "1", "", "") in verdict_rows(verdict)
