@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,10 +11,13 @@ from quiltcli.channels import MOST_HALF
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
-from quiltcli.shading.adaptive import NodeShader, pixel_colors
+from quiltcli.scene import Scene
+from quiltcli.shading.adaptive import NodeShader, pixel_colors, shaded
 from quiltcli.shading.aovs import fill, wanted_for
+from quiltcli.shading.nodes import NodeColors
 from quiltcli.shading.shade import shading_wants
-from quiltcli.visibility.draw import Drawing, Frame, Hits, draw, rasterize
+from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
 
 
@@ -53,12 +57,11 @@ def draw_batch(
         channels = tuple(name for name in channels if name != "rgba")
     wanted = wanted_for(channels, stage.scene)
     if frame.order is not None:
-        wanted = replace(wanted, position=True)
+        wanted |= Wanted.POSITION
     visible, first = 0, stage.blocks.tiles(batch).start
     drawing = draw(frame, batch)
-    shader = NodeShader(stage.scene, frame.viewer.eye) if "rgba" in channels else None
-    for hits in drawing.hits(wanted, shader):
-        fill(buffers, channels, stage.scene, frame.viewer, hits)
+    for hits, colors in seen(drawing, wanted, stage.scene, frame.viewer, colored="rgba" in channels):
+        fill(buffers, channels, stage.scene, frame.viewer, hits, colors)
         if frame.order is not None:
             fill_stored(buffers, frame.order, hits)
         visible += hits.inside
@@ -68,6 +71,16 @@ def draw_batch(
     tiles[drawing.drawn() - first] = True
     drawing.done()
     return Drawn(visible, tiles)
+
+
+def seen(
+    drawing: Drawing, wanted: Wanted, scene: Scene, viewer: Viewer, *, colored: bool
+) -> Iterator[tuple[Hits, NodeColors | None]]:
+    """The hits of a drawing; if they are `colored`, with the colours at nodes where light is smooth."""
+    if colored:
+        yield from shaded(drawing.regions(wanted, scene), NodeShader(scene, viewer.eye))
+    else:
+        yield from ((hits, None) for hits in drawing.hits(wanted, scene))
 
 
 def empty_missed(stage: Stage, drawing: Drawing, stale: BoolArray, first: int, buffers: Buffers) -> None:
@@ -103,12 +116,14 @@ def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Bu
     found = []
     scene, eye = stage.scene, frame.viewer.eye
     for sample in sample_places(samples):
-        for hits in rasterize(frame, batch, sample, shading_wants(scene), NodeShader(scene, eye)):
+        drawing = draw(frame, batch, sample)
+        for hits, known in shaded(drawing.regions(shading_wants(scene), scene), NodeShader(scene, eye)):
             rgba = np.ones((4, hits.depth.size), dtype=np.float32)
-            colors = pixel_colors(scene, eye, hits)
+            colors = pixel_colors(scene, eye, hits, known)
             for color, mine in zip(colors * (3 // len(colors)), rgba, strict=False):
                 np.minimum(color, MOST_HALF, out=mine.reshape(hits.depth.shape))
             found.append((hits.pixel, np.stack([hits.drawn(c.reshape(hits.depth.shape)) for c in rgba])))
+        drawing.done()
     if not found or "rgba" not in stage.job.output.channels:
         return
     pixel = np.concatenate([p for p, _ in found])

@@ -7,16 +7,16 @@ between them is closer to the others than half floats can tell. Everything else 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.scene import Scene
-from quiltcli.shading.nodes import NodeColors
+from quiltcli.shading.nodes import NodeColors, nodes_of, points_at_nodes
 from quiltcli.shading.shade import LEAST_DISTANCE, alpha, shade, vertex_colors
-from quiltcli.visibility.draw import Hits, WholeTiles
+from quiltcli.visibility.draw import Hits, MixedTiles, Region, WholeTiles
 from quiltcli.visibility.resolve.vectors import sum_of_products
 
 _CALM = 24.0
@@ -30,25 +30,51 @@ _FLOOR = 1 / 64
 """Where cosines are smaller, single precision is too coarse for a polynomial."""
 
 
-def pixel_colors(scene: Scene, eye: FloatArray, hits: Hits) -> tuple[Float32Array, ...]:
+def shaded(regions: Iterable[Region], shader: NodeShader) -> Iterator[tuple[Hits, NodeColors | None]]:
+    """The hits of all regions; with the colours at nodes where light is smooth.
+
+    A square in which it is not is looked at by microtiles, a microtile pixel by pixel.
+    """
+    for region in regions:
+        if isinstance(region, MixedTiles):
+            for hits in region.hits():
+                yield hits, None
+            continue
+        calm = shader.calm(region)
+        if calm.any():
+            some = region.of(calm)
+            colors = shader.colors(some)
+            for part in some.parts():
+                yield some[part].read(), colors[part]
+        rest = region.of(~calm)
+        if region.side > 1:
+            yield from shaded(rest.split(), shader)
+            continue
+        for hits in rest.hits():
+            yield hits, None
+
+
+def pixel_colors(
+    scene: Scene, eye: FloatArray, hits: Hits, colors: NodeColors | None = None
+) -> tuple[Float32Array, ...]:
     """As `shading.shade`, of hits whose colours may be known at nodes."""
-    return shade(scene, eye, hits.points) if hits.colors is None else tuple(hits.colors.pixels())
+    return shade(scene, eye, hits.points) if colors is None else tuple(colors.pixels())
 
 
 @dataclass(frozen=True)
 class NodeShader:
-    """A `raster.TileShader` of a scene and an eye (3,)."""
+    """Shades squares of a scene by their nodes, for an eye (3,)."""
 
     scene: Scene
     eye: FloatArray
 
     def colors(self, squares: WholeTiles) -> NodeColors:
         """Colours at the nodes of S squares."""
-        colors = shade(self.scene, self.eye, squares.at_nodes())
+        colors = shade(self.scene, self.eye, points_at_nodes(squares))
         nodes = np.empty((len(colors), max(map(len, colors)), squares.triangle.size))
         for values, color in zip(nodes, colors, strict=True):
             values[:] = np.minimum(color, _MOST)  # sums with infinity would be no numbers
-        return NodeColors(squares.nodes.on_grids(nodes), squares.nodes)
+        return NodeColors(nodes_of(squares.side).on_grids(nodes), nodes_of(squares.side))
 
     def calm(self, squares: WholeTiles) -> BoolArray:
         """Which squares (S,) have no glint, no shadow's edge and no grazing view in or near them.
@@ -58,7 +84,7 @@ class NodeShader:
         kinks that are known. What a polynomial misses falls with the third power of the distance to them.
         """
         assert squares.normal is not None
-        nodes, rays = squares.nodes, squares.rays.vectors
+        nodes, rays = nodes_of(squares.side), squares.rays.vectors
         ray, normal = nodes.middle_vectors(rays), nodes.middle_vectors(squares.normal)
         ray_over, normal_over = _over_length(ray), _over_length(normal)
         eye, normal = -ray * ray_over, normal * normal_over
@@ -70,7 +96,7 @@ class NodeShader:
         if len(self.scene.lights.point_position) or len(squares.weights):
             result &= _CALM * depth_turn < 1
         if self.scene.corner_colors is not None:
-            hues = vertex_colors(self.scene.corner_colors, squares.at_nodes())
+            hues = vertex_colors(self.scene.corner_colors, points_at_nodes(squares))
             result &= (_VARIED * hues.min(axis=1) >= hues.max(axis=1)).all(axis=0)
         rough = alpha(self.scene, squares.triangle)
         for lamp, lamp_turn in self._lamps(squares, eye, eye_turn, eye_turn + depth_turn):
@@ -102,7 +128,9 @@ class NodeShader:
         if lights.headlight:
             yield eye, eye_turn
         if len(lights.point_position):
-            point = squares.nodes.middle(squares.rays.axes) / squares.nodes.middle(squares.inverse)
+            point = nodes_of(squares.side).middle(squares.rays.axes) / nodes_of(squares.side).middle(
+                squares.inverse
+            )
             distance = np.sqrt(sum_of_products(point, point))
             for place in lights.point_position:
                 offset = (place - self.eye)[:, None] - point

@@ -35,7 +35,7 @@ class Source:
     """
 
     values: Callable[[Scene, Viewer, Hits], Values | Sequence[Values]]
-    wanted: Callable[[Scene], Wanted] = lambda _: Wanted()
+    wanted: Callable[[Scene], Wanted] = lambda _: Wanted.NOTHING
 
 
 def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
@@ -44,11 +44,11 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
     return np.asarray((far + near) / (far - near) - 2 * far * near / ((far - near) * z))
 
 
-def _rgba(scene: Scene, viewer: Viewer, hits: Hits) -> Sequence[Values]:
-    if hits.colors is None:
+def _rgba(scene: Scene, viewer: Viewer, hits: Hits, known: NodeColors | None = None) -> Sequence[Values]:
+    if known is None:
         colors = list(map(half_floats, pixel_colors(scene, viewer.eye, hits)))
     else:
-        colors = _halves_between(hits.colors)
+        colors = _halves_between(known)
     return *colors * (3 // len(colors)), np.ones((1, 1), dtype=np.float16)
 
 
@@ -92,29 +92,39 @@ SOURCES: dict[str, Source] = {
     "facet": Source(_facet),
     "object": Source(_object),
     "triangle": Source(_triangle),
-    "N": Source(_normal, lambda scene: Wanted(normals=scene.corner_normals)),
-    "P": Source(_point, lambda _: Wanted(position=True)),
+    "N": Source(_normal, lambda _: Wanted.NORMAL),
+    "P": Source(_point, lambda _: Wanted.POSITION),
 }
 
 
 def wanted_for(names: Iterable[str], scene: Scene) -> Wanted:
     """What the hits have to tell for these channels."""
-    each = [SOURCES[name].wanted(scene) for name in names]
-    return Wanted(
-        normals=next((one.normals for one in each if one.normals is not None), None),
-        weights=any(one.weights for one in each),
-        position=any(one.position for one in each),
-    )
+    wanted = Wanted.NOTHING
+    for name in names:
+        wanted |= SOURCES[name].wanted(scene)
+    return wanted
 
 
 def fill(
-    buffers: Mapping[str, Values], names: Iterable[str], scene: Scene, viewer: Viewer, hits: Hits
+    buffers: Mapping[str, Values],
+    names: Iterable[str],
+    scene: Scene,
+    viewer: Viewer,
+    hits: Hits,
+    colors: NodeColors | None = None,
 ) -> None:
-    """Write the channels `names` of all hits into flat `buffers`, at the pixels the hits belong to."""
+    """Write the channels `names` of all hits into flat `buffers`, at the pixels the hits belong to.
+
+    `colors` are those at the nodes, where they are known.
+    """
     for name in names:
-        values_of = SOURCES[name].values
-        for layer, values in zip(CHANNELS[name].layers, values_of(scene, viewer, hits), strict=True):
-            hits.put(buffers[layer], values)
+        values = (
+            _rgba(scene, viewer, hits, colors)
+            if name == "rgba"
+            else SOURCES[name].values(scene, viewer, hits)
+        )
+        for layer, layer_values in zip(CHANNELS[name].layers, values, strict=True):
+            hits.put(buffers[layer], layer_values)
 
 
 def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray
+from quiltcli.visibility.resolve.hits import Points
 from quiltcli.visibility.resolve.vectors import BlockVectors, PointVectors, Vectors
+from quiltcli.visibility.resolve.whole import WholeTiles
 from quiltcli.visibility.setup.planes import power_of_two
 
 
@@ -130,6 +132,24 @@ def _slopes(planes: FloatArray) -> FloatArray:
 
 nodes_of = lru_cache(Nodes)
 """`Nodes` by their side; what they need is computed once."""
+
+
+def points_at_nodes(squares: WholeTiles) -> Points:
+    """What is seen at the nodes of S squares: groups of the same node, (9, S)."""
+    nodes = nodes_of(squares.side)
+    weights = position = None
+    if len(squares.weights):
+        second, third, total = nodes.at(squares.weights)
+        weights = np.stack((second / total, third / total)).astype(np.float32)
+    if squares.rays.placed:
+        position = nodes.at(squares.rays.axes) / nodes.at(squares.inverse)
+    return Points(
+        triangle=squares.triangle[None],
+        ray=nodes.vectors(squares.rays.vectors),
+        normal=None if squares.normal is None else nodes.vectors(squares.normal),
+        weights=weights,
+        position=position,
+    )
 
 
 @dataclass(frozen=True)

@@ -92,11 +92,12 @@ class _Surface:
 
 def shading_wants(scene: Scene) -> Wanted:
     """What shading asks of hits."""
-    return Wanted(
-        normals=scene.corner_normals,
-        weights=scene.corner_colors is not None,
-        position=len(scene.lights.point_color) > 0,
-    )
+    wanted = Wanted.NORMAL
+    if scene.corner_colors is not None:
+        wanted |= Wanted.WEIGHTS
+    if len(scene.lights.point_color):
+        wanted |= Wanted.POSITION
+    return wanted
 
 
 def shade(scene: Scene, eye: FloatArray, seen: Points) -> tuple[Float32Array, ...]:

@@ -2,8 +2,9 @@
 
 The stages, in order: `blocks` cuts the facets' rectangles into pieces that fit the cache; `prewarp`
 gives each pair of binning to its blocks and finds its pixels there; `small` and `large` make `planes`
-of the pairs and raise the depth `keys` of a canvas; `visibility` reads from the canvas which `surfaces`
-its `whole` microtiles or single `pixels` see, and `tiles` knows where those are.
+of the pairs and raise the depth `keys` of a canvas (the visibility buffer); `visibility` reads from the
+canvas which `surfaces` its `whole` microtiles or single `pixels` see, region by region, and `tiles` knows
+where those are. Nothing here knows of colour.
 """
 
 from __future__ import annotations
@@ -15,11 +16,14 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.projection.planar import QuiltRays
+from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
+from quiltcli.visibility.resolve.pixels import MixedTiles
+from quiltcli.visibility.resolve.reader import Reader
 from quiltcli.visibility.resolve.tiles import missed_pixels
-from quiltcli.visibility.resolve.visibility import read_canvas
-from quiltcli.visibility.resolve.whole import TileShader, WholeTiles
+from quiltcli.visibility.resolve.visibility import SQUARE, Region, read_canvas
+from quiltcli.visibility.resolve.whole import WholeTiles
 from quiltcli.visibility.scan.depth import DepthRange, triangles_in_range
 from quiltcli.visibility.scan.depth_buffers import DepthOrder
 from quiltcli.visibility.scan.keys import serial_bits
@@ -53,6 +57,8 @@ __all__ = [
     "Drawing",
     "Frame",
     "Hits",
+    "MixedTiles",
+    "Region",
     "Sight",
     "Wanted",
     "WholeTiles",
@@ -119,14 +125,28 @@ class Drawing:
     limits: DepthRange
     bits: int
 
-    def hits(self, wanted: Wanted, shader: TileShader | None = None) -> Iterator[Hits]:
-        """What the pixels see, each of the batch at most once; whole microtiles with their colours."""
-        return read_canvas(self.canvas, self.table, self.blocks, self.limits, self.bits, wanted, shader)
+    def regions(
+        self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None, largest: int = SQUARE
+    ) -> Iterator[Region]:
+        """All that is seen, each pixel of the batch in at most one region.
+
+        Args:
+            wanted: what the regions' hits shall tell.
+            scene: what was drawn; its normals are needed where they are wanted.
+            largest: microtiles from side to side of the largest regions, SQUARE or 1.
+        """
+        reader = Reader(self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted)
+        return read_canvas(reader, largest)
+
+    def hits(self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None) -> Iterator[Hits]:
+        """What the pixels see, each of the batch at most once; see `regions`."""
+        for region in self.regions(wanted, scene, largest=1):
+            yield from region.hits()
 
     def missed(self, wanted: BoolArray, first: int) -> Iterator[Places]:
         """The pixels of facets that see nothing, in microtiles whose blocks have pairs.
 
-        Reading `hits` finds microtiles that have none: asked afterwards, there is less to look through.
+        Reading finds microtiles that have none: asked afterwards, there is less to look through.
 
         Args:
             wanted: (m,) the microtiles that are asked about, of the batch's blocks.
@@ -147,12 +167,12 @@ def rasterize(
     frame: Frame,
     batch: tuple[int, int],
     sample: tuple[float, float] = (0.0, 0.0),
-    wanted: Wanted | None = None,
-    shader: TileShader | None = None,
+    wanted: Wanted = Wanted.NOTHING,
+    scene: Scene | None = None,
 ) -> Iterator[Hits]:
     """What the pixels of one batch see; `wanted` is what the hits shall tell. See `draw`, `Drawing.hits`."""
     drawing = draw(frame, batch, sample)
-    yield from drawing.hits(wanted or Wanted(), shader)
+    yield from drawing.hits(wanted, scene)
     drawing.done()
 
 
@@ -164,6 +184,7 @@ def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.
         batch: one of `batches(frame)`.
         sample: where in the pixel to look, in pixels from its centre.
     """
+    # What will be drawn on: the batch's microtiles, their rays, and how keys of depth are made.
     counts = frame.pairs.per_block
     block = batch[0] + np.flatnonzero(counts[batch[0] : batch[1]])
     bits = serial_bits(int(counts[block].sum()))
@@ -174,6 +195,7 @@ def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.
         viewer.near, viewer.far, viewer.by_distance, viewer.depth == "radial", viewer.look, rays
     )
     by = None if frame.order is None else BatchOrder(frame.order, limits, frame.blocks.facet[block])
+    # Triangles in homogeneous pixels, small ones apart from large ones.
     matrices = block_matrices(frame.rays, frame.blocks, block, sample)
     pairs = warp(frame.sight, frame.pairs, frame.blocks, block, matrices)
     table = PlaneTable(pairs.triangle.size)

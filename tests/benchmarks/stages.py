@@ -19,7 +19,7 @@ from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene import Scene
 from quiltcli.shading.shade import shading_wants
 from quiltcli.viewer.viewer import Viewer
-from quiltcli.visibility.draw import Frame, batches, rasterize
+from quiltcli.visibility.draw import Frame, Wanted, batches, rasterize
 from quiltcli.visibility.shares import bin_frame
 from tests.benchmarks.meshes import Mesh, scene_of
 from tests.helpers.in_memory import CUBE, CUBE_FACES, display, icosphere, viewer
@@ -119,9 +119,11 @@ def binned(stage: Stage, seen_by: Viewer) -> Work:
 
 def all_hits(work: Work) -> int:
     """Rasterize every batch; the number of pixels that see the scene."""
-    wanted = replace(shading_wants(work.scene), position=True, weights=True)
+    wanted = shading_wants(work.scene) | Wanted.POSITION | Wanted.WEIGHTS
     return sum(
-        hits.pixel.size for batch in work.batches for hits in rasterize(work.frame, batch, wanted=wanted)
+        hits.pixel.size
+        for batch in work.batches
+        for hits in rasterize(work.frame, batch, wanted=wanted, scene=work.scene)
     )
 
 

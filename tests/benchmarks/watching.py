@@ -19,6 +19,7 @@ from quiltcli.shading.adaptive import NodeShader
 from quiltcli.visibility import draw as raster
 from quiltcli.visibility import shares as binframe
 from quiltcli.visibility.binning import pairs as binning
+from quiltcli.visibility.draw import MixedTiles, WholeTiles
 
 STAGES: tuple[tuple[object, str, str], ...] = (
     (crew, "bin_frame", "bin"),
@@ -30,6 +31,9 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (raster, "large_spans", "large triangles"),
     (raster, "draw_large", "large triangles"),
     (raster, "read_canvas", "visibility"),
+    (WholeTiles, "split", "visibility"),
+    (WholeTiles, "read", "visibility"),
+    (MixedTiles, "hits", "visibility"),
     (NodeShader, "calm", "shade"),
     (NodeShader, "colors", "shade"),
     (channels, "pixel_colors", "shade"),

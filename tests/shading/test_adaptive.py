@@ -57,7 +57,9 @@ def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False, side=1):
     vectors = BlockVectors(rays, square, np.zeros(COUNT), np.zeros(COUNT), side)
     none = np.zeros(COUNT, np.int64)
     return WholeTiles(
+        reader=None,
         tiles=Tiles(*[none] * 9),
+        pair=none,
         triangle=np.zeros(COUNT, np.int32),
         rays=TileRays(
             vectors,
@@ -68,15 +70,14 @@ def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False, side=1):
         inverse=on_grid(inverse, side),
         normal=TileVectors(normals, side),
         weights=on_grid(weights, side),
-        border=None,
         side=side,
     )
 
 
 def relative_errors(scene, some):
     """How far squares (n, k) shaded at nodes are from pixel by pixel, over the value, of all colours."""
-    exact = shade(scene, EYE, some.hits(None).points)
-    found = pixel_colors(scene, EYE, some.hits(NodeShader(scene, EYE).colors(some)))
+    exact = shade(scene, EYE, some.read().points)
+    found = pixel_colors(scene, EYE, some.read(), NodeShader(scene, EYE).colors(some))
     pairs = zip(found, exact, strict=True)
     return np.stack([np.abs(f.astype(float) - e) / np.maximum(e, 1e-4) for f, e in pairs])
 
@@ -158,10 +159,10 @@ def test_colours_between_nodes_are_rounded_like_others(color):
     scene = wall(lights([-lamp], [[1, 1, 1]], ambient=color), color=(1, 1, 1))
     some = tiles(np.random.default_rng(10), lamp, bent=True, near_glint=False)
     some = some[NodeShader(scene, EYE).calm(some)]
-    seen = some.hits(NodeShader(scene, EYE).colors(some))
-    halves = SOURCES["rgba"].values(scene, None, seen)[:3]
-    exact = shade(scene, EYE, seen.points)
-    for found, values, each in zip(halves, pixel_colors(scene, EYE, seen), exact, strict=True):
+    colors = NodeShader(scene, EYE).colors(some)
+    halves = SOURCES["rgba"].values(scene, None, some.read(), colors)[:3]
+    exact = shade(scene, EYE, some.read().points)
+    for found, values, each in zip(halves, colors.pixels(), exact, strict=True):
         np.testing.assert_array_equal(found, half_floats(values))
         steps = found.view(np.int16).astype(int) - half_floats(each).view(np.int16)
         assert np.abs(steps).max() <= 1

@@ -304,7 +304,7 @@ def test_hits_and_missed_pixels_are_all_that_the_facets_own():
         for batch in raster.batches(shown.frame):
             drawing = raster.draw(shown.frame, batch)
             tiles = np.ones(shown.frame.blocks.used.size, bool)
-            for part in (*(h.places for h in drawing.hits(raster.Wanted())), *drawing.missed(tiles, 0)):
+            for part in (*(h.places for h in drawing.hits()), *drawing.missed(tiles, 0)):
                 np.add.at(count, part.pixel, 1)
         facet = shown.frame.blocks.facet[shown.frame.pairs.per_block > 0]
         np.testing.assert_array_equal(count, np.isin(np.abs(shown.owners), facet + 1))
@@ -320,7 +320,7 @@ def test_a_canvas_in_memory_that_was_used_shows_nothing_of_it():
             seen = np.full(one.owners.size, -1)
             for batch in raster.batches(one.frame):
                 drawing = raster.draw(one.frame, batch)
-                for hits in drawing.hits(raster.Wanted()):
+                for hits in drawing.hits():
                     hits.put(seen, hits.triangle[:, None])
                 drawing.done()
             np.testing.assert_array_equal(seen, one.triangle)

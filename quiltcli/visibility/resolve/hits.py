@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Flag, auto
 from functools import cached_property
 from typing import Any
 
@@ -10,26 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
-from quiltcli.shading.nodes import NodeColors
 from quiltcli.visibility.resolve.vectors import PointVectors, Vectors
 
 RUN = 8
 """Pixels of a microtile that are neighbours in the quilt."""
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What is asked of hits beside their place, ray and depth.
+class Wanted(Flag):
+    """What is asked of hits beside their place, triangle, ray and depth."""
 
-    Attributes:
-        normals: (T, 12) the scene's `corner_normals`, None where no normals are asked for.
-        weights: whether barycentric weights are.
-        position: whether positions are.
-    """
-
-    normals: Float32Array | None = None
-    weights: bool = False
-    position: bool = False
+    NOTHING = 0
+    NORMAL = auto()
+    """Interpolated normals."""
+    WEIGHTS = auto()
+    """Barycentric weights."""
+    POSITION = auto()
+    """Points, minus the eye."""
 
 
 def _none() -> IntArray:
@@ -123,8 +120,6 @@ class Hits:
         weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
         position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
         inside: how many of the drawn pixels lie in their facet's polygon, not in its bleed.
-        colors: those at the nodes of microtiles, or of squares of them; None where pixels are to be shaded
-            one by one.
     """
 
     places: Places
@@ -137,7 +132,6 @@ class Hits:
     weights: Float32Array | None
     position: FloatArray | None
     inside: int
-    colors: NodeColors | None = None
 
     @property
     def points(self) -> Points:

@@ -2,21 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
-from quiltcli.visibility.resolve.hits import Hits, Places
+from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.reader import Reader, rays_through
 from quiltcli.visibility.resolve.surfaces import surfaces
-from quiltcli.visibility.resolve.tiles import Tiles
+from quiltcli.visibility.resolve.tiles import Tiles, owned_pixels
 from quiltcli.visibility.resolve.vectors import BASIS, PointVectors, vector_values
 from quiltcli.visibility.scan.keys import distinct, serial_of
 from quiltcli.visibility.setup.planes import Planes
 
 _DX, _DY = BASIS[0].astype(np.float32), BASIS[1].astype(np.float32)
+
+
+@dataclass(frozen=True)
+class MixedTiles:
+    """A region of n microtiles in which several triangles show, or one triangle and nothing.
+
+    Attributes:
+        reader: the canvas.
+        tiles: where they lie.
+        complete: whether every pixel sees something and is the facet's: such pixels are stored in runs of
+            neighbours, for that is fastest.
+    """
+
+    reader: Reader
+    tiles: Tiles
+    complete: bool
+
+    def hits(self) -> Iterator[Hits]:
+        """What their pixels see, each a group of its own."""
+        keys = self.reader.canvas.keys.take(self.tiles.index, axis=0)
+        if self.complete:
+            pixel, places, inside = np.arange(keys.size), self.tiles.places(), keys.size
+            keys = keys.reshape(-1)
+        else:
+            pixel, places, inside = owned_pixels(self.reader.blocks, self.tiles, keys != 0)
+            keys = keys.reshape(-1).take(pixel)
+        if keys.size:
+            yield pixel_hits(self.reader, self.tiles, keys, pixel, places, inside)
 
 
 def pixel_hits(
@@ -36,7 +66,7 @@ def pixel_hits(
     serial, which = distinct(serial_of(keys, reader.bits), reader.table.row_of_serial.size)
     rows = reader.table.row_of_serial.take(serial)
     x0, y0 = (planes.box[k].take(rows) for k in (0, 2))
-    seen = surfaces(planes, rows, wanted, reader.limits.handed, x0, y0)
+    seen = surfaces(reader, rows, wanted, x0, y0)
     complete = pixel.size == tiles.x.size * 64
 
     def chosen(values: NDArray[Any]) -> NDArray[Any]:
@@ -52,9 +82,9 @@ def pixel_hits(
     rays = rays_through(reader, tiles)
     depth, position = rays.values()
     normal = weights = None
-    if wanted.normals is not None:
+    if Wanted.NORMAL in wanted:
         normal = PointVectors(_values(seen.normal, which, x, y, x0, y0))
-    if wanted.weights:
+    if Wanted.WEIGHTS in wanted:
         second, third, total = _values(seen.weights, which, x, y, x0, y0)
         weights = np.stack((second / total, third / total)).astype(np.float32)
     return Hits(

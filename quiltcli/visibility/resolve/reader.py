@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, IntArray
+from quiltcli.geometry import Float32Array, FloatArray, IntArray
+from quiltcli.scene import Scene
 from quiltcli.visibility.resolve.hits import Wanted
 from quiltcli.visibility.resolve.tiles import Tiles
 from quiltcli.visibility.resolve.vectors import BlockVectors, grid_values, on_grid
@@ -17,14 +18,31 @@ from quiltcli.visibility.setup.planes import PlaneTable
 
 @dataclass(frozen=True)
 class Reader:
-    """What is needed to read a canvas; `visibility.read_canvas` says what its attributes are."""
+    """What is needed to read a canvas.
+
+    Attributes:
+        canvas: what was drawn.
+        table: the planes of all pairs that were.
+        blocks: the blocks.
+        limits: how depth is measured, with the rays of the canvas's blocks.
+        bits: bits of the serial in a key.
+        scene: what was drawn; None where nothing of its surfaces is wanted.
+        wanted: what hits shall tell.
+    """
 
     canvas: Canvas
     table: PlaneTable
     blocks: Blocks
     limits: DepthRange
     bits: int
+    scene: Scene | None
     wanted: Wanted
+
+    @property
+    def corner_normals(self) -> Float32Array:
+        """The scene's (T, 12)."""
+        assert self.scene is not None
+        return self.scene.corner_normals
 
 
 @dataclass(frozen=True)
@@ -62,7 +80,7 @@ class TileRays:
 
 def rays_through(reader: Reader, tiles: Tiles, side: int = 1) -> TileRays:
     """Rays through the pixels of squares of `side` by `side` microtiles, the first of which are `tiles`."""
-    limits, placed = reader.limits, reader.wanted.position
+    limits, placed = reader.limits, Wanted.POSITION in reader.wanted
     matrix = np.ascontiguousarray(limits.rays.transpose(1, 2, 0))
     vectors = BlockVectors(matrix, tiles.block, tiles.x, tiles.y, side)
     none = np.zeros((0, 3, tiles.x.size))

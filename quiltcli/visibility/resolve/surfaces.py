@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.visibility.resolve.hits import Wanted
+from quiltcli.visibility.resolve.reader import Reader
 from quiltcli.visibility.resolve.vectors import PointVectors
 from quiltcli.visibility.setup.planes import Planes, moved, power_of_two
 
@@ -37,36 +38,31 @@ class Surfaces:
     weights: FloatArray
 
 
-def surfaces(
-    planes: Planes, rows: IntArray, wanted: Wanted, handed: FloatArray, x: NDArray[Any], y: NDArray[Any]
-) -> Surfaces:
+def surfaces(reader: Reader, rows: IntArray, wanted: Wanted, x: NDArray[Any], y: NDArray[Any]) -> Surfaces:
     """The surfaces of some pairs.
 
     Args:
-        planes: the planes of a batch.
-        rows: (n,) the pairs.
+        reader: the canvas they are seen in.
+        rows: (n,) the pairs, rows of its planes.
         wanted: what is asked for.
-        handed: (K,) sign of the determinant of every block's matrix.
         x: (n,) columns in the blocks at which the planes begin.
         y: (n,) rows.
     """
+    planes = reader.table.planes
     triangle = planes.triangle.take(rows)
     normal = np.zeros((0, 3, rows.size), dtype=np.float32)
     weights = np.zeros((0, 3, rows.size))
-    if wanted.normals is not None or wanted.weights:
+    if wanted & (Wanted.NORMAL | Wanted.WEIGHTS):
+        # The sum of the edge functions in the first's place, then the second and the third.
         edge = moved(np.take(planes.edge, rows, axis=2), x, y)
         edge[0] += edge[1]
         edge[0] += edge[2]
-        edge *= facing(planes, rows, handed)
-        if wanted.normals is not None:
-            normal = _normals(wanted.normals.take(triangle, axis=0), edge)
-        if wanted.weights:
+        edge *= facing(planes, rows, reader.limits.handed)
+        if Wanted.NORMAL in wanted:
+            normal = _normals(reader.corner_normals.take(triangle, axis=0), edge)
+        if Wanted.WEIGHTS in wanted:
             weights = edge[[1, 2, 0]]
-    return Surfaces(
-        triangle=triangle,
-        normal=normal,
-        weights=weights,
-    )
+    return Surfaces(triangle, normal, weights)
 
 
 def facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
@@ -75,21 +71,23 @@ def facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
     return result
 
 
-def has_one_normal(table: Float32Array, triangle: Int32Array) -> BoolArray:
-    """Which triangles (n,) have the same normal at all corners, by the scene's `corner_normals`."""
-    return np.asarray(~table.take(triangle, axis=0)[:, 3:9].any(axis=1))
+def has_one_normal(reader: Reader, rows: IntArray) -> BoolArray:
+    """Which pairs' triangles (n,) have the same normal at all corners."""
+    triangle = reader.table.planes.triangle.take(rows)
+    return np.asarray(~reader.corner_normals.take(triangle, axis=0)[:, 3:9].any(axis=1))
 
 
-def one_normal(table: Float32Array, planes: Planes, rows: IntArray, handed: FloatArray) -> PointVectors:
+def one_normal(reader: Reader, rows: IntArray) -> PointVectors:
     """The normals, on the side of the eye, of pairs (n,) whose triangles have one each.
 
     Returns:
         (3, n, 1), or (3, 1, 1) where all are the same.
     """
-    triangle, side = planes.triangle.take(rows), facing(planes, rows, handed)
+    planes = reader.table.planes
+    triangle, side = planes.triangle.take(rows), facing(planes, rows, reader.limits.handed)
     if bool((triangle == triangle[0]).all() and (side == side[0]).all()):
         triangle, side = triangle[:1], side[:1]
-    normal = table.take(triangle, axis=0).T[0:3] * side
+    normal = reader.corner_normals.take(triangle, axis=0).T[0:3] * side
     return PointVectors(normal.astype(np.float32)[:, :, None])
 
 

@@ -45,6 +45,26 @@ class Tiles:
         """Some of the microtiles."""
         return Tiles(*(column[part] for column in vars(self).values()))
 
+    def split(self, side: int, across: IntArray) -> Tiles:
+        """All microtiles (n·side²,) of squares that begin with these; `across` (n,) are in a block's row."""
+        row, column = np.divmod(np.arange(side * side), side)
+        further = across[:, None] * row + column
+
+        def each(first: IntArray, step: IntArray) -> IntArray:
+            return np.asarray((first[:, None] + step).reshape(-1))
+
+        return Tiles(
+            index=each(self.index, further),
+            block=self.block.repeat(side * side),
+            x=each(self.x, 8 * column),
+            y=each(self.y, 8 * row),
+            address=each(self.address, 8 * (self.stride[:, None] * row + column)),
+            stride=self.stride.repeat(side * side),
+            facet=self.facet.repeat(side * side),
+            interior=self.interior.repeat(side * side),
+            number=each(self.number, further),
+        )
+
     def lines(self, side: int = 1) -> IntArray:
         """Quilt addresses (n, 8·side) of the first pixels of the rows of squares that begin with them."""
         step = self.stride[:1, None] if (self.stride == self.stride[:1]).all() else self.stride[:, None]
