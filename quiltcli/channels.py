@@ -48,6 +48,10 @@ CHANNELS: Mapping[str, Channel] = MappingProxyType(
         "triangle": Channel(("triangle",), _UINT),
         "N": Channel(("N.X", "N.Y", "N.Z"), _HALF),
         "P": Channel(("P.X", "P.Y", "P.Z"), _FLOAT),
+        "albedo": Channel(("albedo.R", "albedo.G", "albedo.B"), _HALF),
+        "diffuse": Channel(("diffuse.R", "diffuse.G", "diffuse.B"), _HALF),
+        "specular": Channel(("specular.R", "specular.G", "specular.B"), _HALF),
+        "emission": Channel(("emission.R", "emission.G", "emission.B"), _HALF),
     }
 )
 

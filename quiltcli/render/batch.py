@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,12 +10,7 @@ from quiltcli.channels import MOST_HALF
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
-from quiltcli.scene import Scene
-from quiltcli.shading.adaptive import NodeShader, pixel_colors, shaded
-from quiltcli.shading.aovs import fill, wanted_for
-from quiltcli.shading.nodes import NodeColors
-from quiltcli.shading.shade import shading_wants
-from quiltcli.viewer.viewer import Viewer
+from quiltcli.shading.aovs import fill, shaded_for, wanted_for
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
 
@@ -60,27 +54,17 @@ def draw_batch(
         wanted |= Wanted.POSITION
     visible, first = 0, stage.blocks.tiles(batch).start
     drawing = draw(frame, batch)
-    for hits, colors in seen(drawing, wanted, stage.scene, frame.viewer, colored="rgba" in channels):
-        fill(buffers, channels, stage.scene, frame.viewer, hits, colors)
+    for shaded in shaded_for(channels, drawing, wanted, stage.scene, frame.viewer.eye):
+        fill(buffers, channels, frame.viewer, shaded)
         if frame.order is not None:
-            fill_stored(buffers, frame.order, hits)
-        visible += hits.inside
+            fill_stored(buffers, frame.order, shaded.hits)
+        visible += shaded.hits.inside
     if stale.any():
         empty_missed(stage, drawing, stale, first, buffers)
     tiles = np.full(stale.size, not mends_itself(stage))
     tiles[drawing.drawn() - first] = True
     drawing.done()
     return Drawn(visible, tiles)
-
-
-def seen(
-    drawing: Drawing, wanted: Wanted, scene: Scene, viewer: Viewer, *, colored: bool
-) -> Iterator[tuple[Hits, NodeColors | None]]:
-    """The hits of a drawing; if they are `colored`, with the colours at nodes where light is smooth."""
-    if colored:
-        yield from shaded(drawing.regions(wanted, scene), NodeShader(scene, viewer.eye))
-    else:
-        yield from ((hits, None) for hits in drawing.hits(wanted, scene))
 
 
 def empty_missed(stage: Stage, drawing: Drawing, stale: BoolArray, first: int, buffers: Buffers) -> None:
@@ -117,9 +101,9 @@ def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Bu
     scene, eye = stage.scene, frame.viewer.eye
     for sample in sample_places(samples):
         drawing = draw(frame, batch, sample)
-        for hits, known in shaded(drawing.regions(shading_wants(scene), scene), NodeShader(scene, eye)):
+        for shaded in shaded_for(("rgba",), drawing, wanted_for(("rgba",), scene), scene, eye):
+            hits, colors = shaded.hits, shaded.pixels()
             rgba = np.ones((4, hits.depth.size), dtype=np.float32)
-            colors = pixel_colors(scene, eye, hits, known)
             for color, mine in zip(colors * (3 // len(colors)), rgba, strict=False):
                 np.minimum(color, MOST_HALF, out=mine.reshape(hits.depth.shape))
             found.append((hits.pixel, np.stack([hits.drawn(c.reshape(hits.depth.shape)) for c in rgba])))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from quiltcli.scene.lights import Light
 from quiltcli.scene.load import load_scene
-from quiltcli.scene.scene import Lights, Materials, Scene
+from quiltcli.scene.scene import Materials, Scene
 
-__all__ = ["Lights", "Materials", "Scene", "load_scene"]
+__all__ = ["Light", "Materials", "Scene", "load_scene"]

@@ -11,18 +11,18 @@ import numpy as np
 
 from quiltcli.errors import Problem, SceneError, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
-from quiltcli.geometry import Float32Array, FloatArray, normalized
+from quiltcli.geometry import Float32Array
 from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.part import Part, placed
+from quiltcli.scene.lights import lights_of
 from quiltcli.scene.materials import Surface, material_table
-from quiltcli.scene.scene import Lights, Scene
+from quiltcli.scene.scene import Scene
 
 if TYPE_CHECKING:
     from quiltcli.job.scene import LightSpec, ObjectSpec, SceneFile
 
 Color = tuple[float, float, float]
-_DIM: Color = (0.1, 0.1, 0.1)
 
 
 def load_scene(scene: Path | str | SceneFile) -> Scene:
@@ -138,7 +138,7 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         material=np.concatenate(rows),
         objects=tuple(gathered.names),
         materials=material_table(list(gathered.surfaces)),
-        lights=_lights(lights),
+        lights=lights_of(lights),
         background=np.array(background, dtype=np.float32),
         notices=_notices(gathered, unlit=not lights),
         uv=_uv(baked),
@@ -164,22 +164,3 @@ def _notices(gathered: _Gathered, *, unlit: bool) -> tuple[str, ...]:
     if unlit:
         notices.append("the scene has no lights: a headlight at the viewer and a dim ambient light are used")
     return tuple(notices)
-
-
-def _lights(lights: Sequence[LightSpec]) -> Lights:
-    """The lights as arrays; without any, a headlight and a dim ambient light."""
-    sun = [light for light in lights if light.type == "directional"]
-    point = [light for light in lights if light.type == "point"]
-    ambient = [light.color for light in lights if light.type == "ambient"] or ([] if lights else [_DIM])
-    return Lights(
-        directional_direction=normalized(_rows([light.direction for light in sun])).astype(np.float32),
-        directional_color=_rows([light.color for light in sun]).astype(np.float32),
-        point_position=_rows([light.position for light in point]).astype(np.float32),
-        point_color=_rows([light.color for light in point]).astype(np.float32),
-        ambient=_rows(ambient).sum(axis=0).astype(np.float32),
-        headlight=not lights,
-    )
-
-
-def _rows(triples: Sequence[Color]) -> FloatArray:
-    return np.array(triples, dtype=np.float64).reshape(-1, 3)

@@ -10,6 +10,7 @@ import numpy as np
 
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, cross, dot, normalized
+from quiltcli.scene.lights import Light
 
 if TYPE_CHECKING:
     from quiltcli.scene.materials import Texture
@@ -38,33 +39,6 @@ class Materials:
     textures: tuple[tuple[Texture, ...], ...] = ()
 
 
-@dataclass(frozen=True)
-class Lights:
-    """The lights of a scene.
-
-    Attributes:
-        directional_direction: (D, 3) unit direction in which the light travels.
-        directional_color: (D, 3) linear irradiance on a surface that faces the light.
-        point_position: (K, 3) world metres.
-        point_color: (K, 3) radiant intensity; the light falls with the square of the distance.
-        ambient: (3,) linear, from everywhere.
-        headlight: whether a light sits at the viewer's eye because the scene has none of its own.
-    """
-
-    directional_direction: Float32Array
-    directional_color: Float32Array
-    point_position: Float32Array
-    point_color: Float32Array
-    ambient: Float32Array
-    headlight: bool
-
-    @cached_property
-    def grey(self) -> bool:
-        """Whether no lamp has a hue."""
-        lamps = np.concatenate((self.directional_color, self.point_color))
-        return bool((lamps == lamps[:, :1]).all())
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
     """T triangles over V vertices, baked to world space; equal only to itself.
@@ -79,7 +53,7 @@ class Scene:
         material: (T,) row of `materials`.
         objects: names of the objects.
         materials: the table of materials.
-        lights: the lights.
+        lights: the lights, in the order in which they are summed.
         background: (3,) linear colour where nothing is hit.
         notices: sentences to tell the user once: what was dropped or assumed.
         uv: (V, 2) texture coordinates, v up, NaN where there are none; None when there are none at all.
@@ -95,7 +69,7 @@ class Scene:
     material: Int32Array
     objects: tuple[str, ...]
     materials: Materials
-    lights: Lights
+    lights: tuple[Light, ...]
     background: Float32Array
     notices: tuple[str, ...]
     uv: FloatArray | None = None

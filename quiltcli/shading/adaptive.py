@@ -8,136 +8,162 @@ between them is closer to the others than half floats can tell. Everything else 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray
+from quiltcli.geometry import BoolArray, FloatArray
 from quiltcli.scene import Scene
+from quiltcli.shading.brdf import alpha
+from quiltcli.shading.lights import Middle, asks_for_places, turns
+from quiltcli.shading.materials import albedo_at, vertex_colors
 from quiltcli.shading.nodes import NodeColors, nodes_of, points_at_nodes
-from quiltcli.shading.shade import LEAST_DISTANCE, alpha, shade, vertex_colors
-from quiltcli.visibility.draw import Hits, MixedTiles, Region, WholeTiles
+from quiltcli.shading.shade import Light, Shades, filled, shade, shade_apart
+from quiltcli.visibility.draw import Hits, Region, WholeTiles
 from quiltcli.visibility.resolve.vectors import sum_of_products
 
-_CALM = 24.0
-"""A function is calm in a square that reaches a 24th of the way to the function's nearest pole."""
+_FAR = 24.0
+"""A function is smooth in a square that reaches a 24th of the way to the function's nearest pole."""
 
 _MOST = np.float32(2.0**100)
 _VARIED = 8
-"""Vertex colours are calm where the brightest in a square is at most so many times the darkest."""
+"""Vertex colours are smooth where the brightest in a square is at most so many times the darkest."""
 
 _FLOOR = 1 / 64
 """Where cosines are smaller, single precision is too coarse for a polynomial."""
 
 
-def shaded(regions: Iterable[Region], shader: NodeShader) -> Iterator[tuple[Hits, NodeColors | None]]:
-    """The hits of all regions; with the colours at nodes where light is smooth.
+@dataclass(frozen=True)
+class NodeLight:
+    """Light at the nodes of S squares in which it is smooth, worked out when it is first asked for."""
+
+    scene: Scene
+    eye: FloatArray
+    squares: WholeTiles
+
+    @cached_property
+    def total(self) -> NodeColors:
+        """All of it."""
+        return self._of(shade(self.scene, self.eye, points_at_nodes(self.squares)))
+
+    @cached_property
+    def apart(self) -> Light[NodeColors]:
+        """Its parts."""
+        light = shade_apart(self.scene, self.eye, points_at_nodes(self.squares))
+        return Light(self._of(light.diffuse), self._of(light.specular), self._of(light.emission))
+
+    def _of(self, colors: Shades) -> NodeColors:
+        nodes = nodes_of(self.squares.side)
+        values = np.empty((len(colors), max(map(len, colors)), self.squares.triangle.size))
+        for row, color in zip(values, colors, strict=True):
+            row[:] = np.minimum(color, _MOST)  # sums with infinity would be no numbers
+        return NodeColors(nodes.on_grids(values, out=values), nodes)
+
+
+@dataclass(frozen=True)
+class Shaded:
+    """What channels are made of: hits, and the light that leaves them, when it is asked for.
+
+    Attributes:
+        scene: what is seen.
+        eye: (3,) from where, world metres.
+        hits: its visible points.
+        nodes: the light of squares, of which these hits are a part; None where light is not smooth.
+        part: which of the squares.
+    """
+
+    scene: Scene
+    eye: FloatArray
+    hits: Hits
+    nodes: NodeLight | None = None
+    part: slice = field(default_factory=lambda: slice(None))
+
+    @property
+    def total(self) -> NodeColors | Shades:
+        """All light, at nodes or at points."""
+        if self.nodes is not None:
+            return self.nodes.total[self.part]
+        return shade(self.scene, self.eye, self.hits.points)
+
+    def pixels(self) -> Shades:
+        """All light, at points."""
+        total = self.total
+        return tuple(total.pixels()) if isinstance(total, NodeColors) else total
+
+    @cached_property
+    def apart(self) -> Light[NodeColors] | Light[Shades]:
+        """The light's parts, at nodes or at points."""
+        if self.nodes is None:
+            return shade_apart(self.scene, self.eye, self.hits.points)
+        light, part = self.nodes.apart, self.part
+        return Light(light.diffuse[part], light.specular[part], light.emission[part])
+
+    @property
+    def albedo(self) -> Shades:
+        """The base colour, at points: it may vary as it likes."""
+        return filled(albedo_at(self.scene, self.hits.points), self.hits.points)
+
+
+def shaded(regions: Iterable[Region], scene: Scene, eye: FloatArray) -> Iterator[Shaded]:
+    """The hits of all regions, with light at nodes where it is smooth.
 
     A square in which it is not is looked at by microtiles, a microtile pixel by pixel.
     """
     for region in regions:
-        if isinstance(region, MixedTiles):
-            for hits in region.hits():
-                yield hits, None
-            continue
-        calm = shader.calm(region)
-        if calm.any():
-            some = region.of(calm)
-            colors = shader.colors(some)
+        rest = region
+        if isinstance(region, WholeTiles):
+            smooth = is_smooth(region, scene, eye)
+            some, rest = region.of(smooth), region.of(~smooth)
+            nodes = NodeLight(scene, eye, some)
             for part in some.parts():
-                yield some[part].read(), colors[part]
-        rest = region.of(~calm)
-        if region.side > 1:
-            yield from shaded(rest.split(), shader)
+                yield Shaded(scene, eye, some[part].read(), nodes, part)
+        if rest.side > 1:
+            yield from shaded(rest.split(), scene, eye)
             continue
         for hits in rest.hits():
-            yield hits, None
+            yield Shaded(scene, eye, hits)
 
 
-def pixel_colors(
-    scene: Scene, eye: FloatArray, hits: Hits, colors: NodeColors | None = None
-) -> tuple[Float32Array, ...]:
-    """As `shading.shade`, of hits whose colours may be known at nodes."""
-    return shade(scene, eye, hits.points) if colors is None else tuple(colors.pixels())
+def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:
+    """Which squares (S,) have no glint, no shadow's edge and no grazing view in or near them.
 
-
-@dataclass(frozen=True)
-class NodeShader:
-    """Shades squares of a scene by their nodes, for an eye (3,)."""
-
-    scene: Scene
-    eye: FloatArray
-
-    def colors(self, squares: WholeTiles) -> NodeColors:
-        """Colours at the nodes of S squares."""
-        colors = shade(self.scene, self.eye, points_at_nodes(squares))
-        nodes = np.empty((len(colors), max(map(len, colors)), squares.triangle.size))
-        for values, color in zip(nodes, colors, strict=True):
-            values[:] = np.minimum(color, _MOST)  # sums with infinity would be no numbers
-        return NodeColors(nodes_of(squares.side).on_grids(nodes), nodes_of(squares.side))
-
-    def calm(self, squares: WholeTiles) -> BoolArray:
-        """Which squares (S,) have no glint, no shadow's edge and no grazing view in or near them.
-
-        Light is made of few functions: the lengths of vectors, Schlick's and Smith's of the angle between
-        normal and eye or lamp, and GGX's of the angle between normal and half vector, all with poles or
-        kinks that are known. What a polynomial misses falls with the third power of the distance to them.
-        """
-        assert squares.normal is not None
-        nodes, rays = nodes_of(squares.side), squares.rays.vectors
-        ray, normal = nodes.middle_vectors(rays), nodes.middle_vectors(squares.normal)
-        ray_over, normal_over = _over_length(ray), _over_length(normal)
-        eye, normal = -ray * ray_over, normal * normal_over
-        eye_turn = nodes.vectors_reach(rays) * ray_over
-        normal_turn = nodes.vectors_reach(squares.normal) * normal_over
-        depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse)
-        nv = sum_of_products(normal, eye)
-        result: BoolArray = nv > np.maximum(_CALM * (eye_turn + normal_turn), _FLOOR)
-        if len(self.scene.lights.point_position) or len(squares.weights):
-            result &= _CALM * depth_turn < 1
-        if self.scene.corner_colors is not None:
-            hues = vertex_colors(self.scene.corner_colors, points_at_nodes(squares))
-            result &= (_VARIED * hues.min(axis=1) >= hues.max(axis=1)).all(axis=0)
-        rough = alpha(self.scene, squares.triangle)
-        for lamp, lamp_turn in self._lamps(squares, eye, eye_turn, eye_turn + depth_turn):
-            nl = sum_of_products(normal, lamp)
-            half2 = np.maximum(1 + sum_of_products(eye, lamp), 1e-12)  # 2 (v·h)²
-            sine2 = np.maximum(1 - np.maximum(nv + nl, 0) ** 2 / (2 * half2), 0)  # of the angle n, h
-            lamp_reach = _CALM * (normal_turn + lamp_turn)
-            half_reach = _CALM * (normal_turn + (eye_turn + lamp_turn) / np.sqrt(2 * half2))
-            pole2 = sine2 + rough * rough
-            result &= np.abs(nl) > np.maximum(lamp_reach, _FLOOR)
-            result &= half2 > 2 * (_CALM * (eye_turn + lamp_turn)) ** 2
-            result &= (pole2 > half_reach**2) & (pole2 * half2 > 2 * _FLOOR)
-        return np.broadcast_to(result, squares.triangle.shape)
-
-    def _lamps(
-        self, squares: WholeTiles, eye: FloatArray, eye_turn: FloatArray, move: FloatArray
-    ) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Unit directions (3, S) or (3, 1) to the lamps, and the angle (S,) or (1,) they turn by.
-
-        Args:
-            squares: S squares.
-            eye: (3, S) unit directions to the eye.
-            eye_turn: (S,) the angle they turn by.
-            move: (S,) how far points of the squares are from their middle, over their distance.
-        """
-        lights = self.scene.lights
-        for direction in lights.directional_direction:
-            yield -direction.astype(np.float64)[:, None], np.zeros(1)
-        if lights.headlight:
-            yield eye, eye_turn
-        if len(lights.point_position):
-            point = nodes_of(squares.side).middle(squares.rays.axes) / nodes_of(squares.side).middle(
-                squares.inverse
-            )
-            distance = np.sqrt(sum_of_products(point, point))
-            for place in lights.point_position:
-                offset = (place - self.eye)[:, None] - point
-                over = _over_length(offset)
-                turn = move * distance * over
-                # Nearer than that, the light does not grow any more.
-                yield offset * over, np.where((1 - turn) > over * LEAST_DISTANCE, turn, np.inf)
+    They are seen from an eye (3,).
+    Light is made of few functions: the lengths of vectors, Schlick's and Smith's of the angle between
+    normal and eye or lamp, and GGX's of the angle between normal and half vector, all with poles or
+    kinks that are known. What a polynomial misses falls with the third power of the distance to them.
+    """
+    assert squares.normal is not None
+    nodes, rays = nodes_of(squares.side), squares.rays.vectors
+    # Directions in the middle, and the angles by which they turn up to the farthest pixel.
+    ray, normal = nodes.middle_vectors(rays), nodes.middle_vectors(squares.normal)
+    ray_over, normal_over = _over_length(ray), _over_length(normal)
+    view, normal = -ray * ray_over, normal * normal_over
+    eye_turn = nodes.vectors_reach(rays) * ray_over
+    normal_turn = nodes.vectors_reach(squares.normal) * normal_over
+    depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse)
+    middle = Middle(squares, eye, view, eye_turn, depth_turn)
+    # The view: not grazing; where light or colour changes from place to place, not too steep.
+    nv = sum_of_products(normal, view)
+    result: BoolArray = nv > np.maximum(_FAR * (eye_turn + normal_turn), _FLOOR)
+    if asks_for_places(scene) or len(squares.weights):
+        result &= _FAR * depth_turn < 1
+    if scene.corner_colors is not None:
+        hues = vertex_colors(scene.corner_colors, points_at_nodes(squares))
+        result &= (_VARIED * hues.min(axis=1) >= hues.max(axis=1)).all(axis=0)
+    # Each lamp: not about to set, not behind the surface as the eye sees it, its image not near.
+    rough = alpha(scene, squares.triangle)
+    for lamp, lamp_turn in turns(scene, middle):
+        nl = sum_of_products(normal, lamp)
+        half2 = np.maximum(1 + sum_of_products(view, lamp), 1e-12)  # 2 (v·h)²
+        sine2 = np.maximum(1 - np.maximum(nv + nl, 0) ** 2 / (2 * half2), 0)  # of the angle n, h
+        lamp_reach = _FAR * (normal_turn + lamp_turn)
+        half_reach = _FAR * (normal_turn + (eye_turn + lamp_turn) / np.sqrt(2 * half2))
+        pole2 = sine2 + rough * rough
+        result &= np.abs(nl) > np.maximum(lamp_reach, _FLOOR)
+        result &= half2 > 2 * (_FAR * (eye_turn + lamp_turn)) ** 2
+        result &= (pole2 > half_reach**2) & (pole2 * half2 > 2 * _FLOOR)
+    return np.broadcast_to(result, squares.triangle.shape)
 
 
 def _over_length(vectors: FloatArray) -> FloatArray:

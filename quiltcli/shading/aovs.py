@@ -5,8 +5,10 @@ The schema of the channels is `quiltcli.channels`; a channel is a row there and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -15,11 +17,13 @@ from numpy.typing import NDArray
 from quiltcli.channels import CHANNELS, MOST_HALF
 from quiltcli.geometry import FloatArray
 from quiltcli.scene import Scene
-from quiltcli.shading.adaptive import pixel_colors
+from quiltcli.shading.adaptive import Shaded, shaded
+from quiltcli.shading.materials import albedo_wants
 from quiltcli.shading.nodes import NodeColors
-from quiltcli.shading.shade import shading_normals, shading_wants
+from quiltcli.shading.shade import Shades, shading_wants
+from quiltcli.shading.surface import shading_normals
 from quiltcli.viewer.viewer import Viewer
-from quiltcli.visibility.resolve.hits import Hits, Wanted
+from quiltcli.visibility.draw import Drawing, Wanted
 
 Values: TypeAlias = NDArray[Any]
 
@@ -29,13 +33,15 @@ class Source:
     """Where a channel's values come from.
 
     Attributes:
-        values: from scene, viewer and hits to an array for each layer, (G, k), (G, 1) where a group's
+        values: from viewer and shaded hits to an array for each layer, (G, k), (G, 1) where a group's
             pixels all have one value, or (1, 1) where all have, of any float or integer type.
         wanted: what of the hits that takes beside triangle and depth.
+        light: whether it is light, which is known at few points where it is smooth.
     """
 
-    values: Callable[[Scene, Viewer, Hits], Values | Sequence[Values]]
+    values: Callable[[Viewer, Shaded], Values | Sequence[Values]]
     wanted: Callable[[Scene], Wanted] = lambda _: Wanted.NOTHING
+    light: bool = False
 
 
 def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
@@ -44,49 +50,58 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
     return np.asarray((far + near) / (far - near) - 2 * far * near / ((far - near) * z))
 
 
-def _rgba(scene: Scene, viewer: Viewer, hits: Hits, known: NodeColors | None = None) -> Sequence[Values]:
-    if known is None:
-        colors = list(map(half_floats, pixel_colors(scene, viewer.eye, hits)))
-    else:
-        colors = _halves_between(known)
-    return *colors * (3 // len(colors)), np.ones((1, 1), dtype=np.float16)
+def _rgba(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+    return *_halves(shaded.total), np.ones((1, 1), dtype=np.float16)
 
 
-def _depth(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.depth[None]
+def _depth(viewer: Viewer, shaded: Shaded) -> Values:
+    return shaded.hits.depth[None]
 
 
-def _canonical_depth(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return canonical_depth(viewer, hits.depth)[None]
+def _canonical_depth(viewer: Viewer, shaded: Shaded) -> Values:
+    return canonical_depth(viewer, shaded.hits.depth)[None]
 
 
-def _facet(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.facet[None, :, None] + 1
+def _facet(viewer: Viewer, shaded: Shaded) -> Values:
+    return shaded.hits.facet[None, :, None] + 1
 
 
-def _object(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return scene.object.take(hits.triangle)[None, :, None] + 1
+def _object(viewer: Viewer, shaded: Shaded) -> Values:
+    return shaded.scene.object.take(shaded.hits.triangle)[None, :, None] + 1
 
 
-def _triangle(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return hits.triangle[None, :, None] + 1
+def _triangle(viewer: Viewer, shaded: Shaded) -> Values:
+    return shaded.hits.triangle[None, :, None] + 1
 
 
-def _normal(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    return shading_normals(hits)
+def _normal(viewer: Viewer, shaded: Shaded) -> Values:
+    return shading_normals(shaded.hits)
 
 
-def _point(scene: Scene, viewer: Viewer, hits: Hits) -> Values:
-    assert hits.position is not None
-    return hits.position + viewer.eye[:, None, None]
+def _point(viewer: Viewer, shaded: Shaded) -> Values:
+    assert shaded.hits.position is not None
+    return shaded.hits.position + viewer.eye[:, None, None]
 
 
-_SCALE = 2.0**-112
-_MOST_SCALED = MOST_HALF * np.float32(_SCALE)
+def _albedo(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+    return _halves(shaded.albedo)
+
+
+def _diffuse(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+    return _halves(shaded.apart.diffuse)
+
+
+def _specular(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+    return _halves(shaded.apart.specular)
+
+
+def _emission(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+    return _halves(shaded.apart.emission)
+
 
 # Depths are measured in double precision and rounded once.
 SOURCES: dict[str, Source] = {
-    "rgba": Source(_rgba, shading_wants),
+    "rgba": Source(_rgba, shading_wants, light=True),
     "Z": Source(_depth),
     "zv": Source(_canonical_depth),
     "facet": Source(_facet),
@@ -94,37 +109,51 @@ SOURCES: dict[str, Source] = {
     "triangle": Source(_triangle),
     "N": Source(_normal, lambda _: Wanted.NORMAL),
     "P": Source(_point, lambda _: Wanted.POSITION),
+    "albedo": Source(_albedo, albedo_wants),
+    "diffuse": Source(_diffuse, shading_wants, light=True),
+    "specular": Source(_specular, shading_wants, light=True),
+    "emission": Source(_emission, shading_wants, light=True),
 }
 
 
 def wanted_for(names: Iterable[str], scene: Scene) -> Wanted:
     """What the hits have to tell for these channels."""
-    wanted = Wanted.NOTHING
-    for name in names:
-        wanted |= SOURCES[name].wanted(scene)
-    return wanted
+    return reduce(or_, (SOURCES[name].wanted(scene) for name in names), Wanted.NOTHING)
 
 
-def fill(
-    buffers: Mapping[str, Values],
-    names: Iterable[str],
-    scene: Scene,
-    viewer: Viewer,
-    hits: Hits,
-    colors: NodeColors | None = None,
-) -> None:
-    """Write the channels `names` of all hits into flat `buffers`, at the pixels the hits belong to.
+def shaded_for(
+    names: Iterable[str], drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray
+) -> Iterator[Shaded]:
+    """All that is seen of a drawing, as these channels are made of it fastest.
 
-    `colors` are those at the nodes, where they are known.
+    Args:
+        names: the channels.
+        drawing: a batch that is drawn.
+        wanted: what the hits shall tell, `wanted_for` the channels at least.
+        scene: what was drawn.
+        eye: (3,) from where it is seen.
     """
+    if any(SOURCES[name].light for name in names):
+        return shaded(drawing.regions(wanted, scene), scene, eye)
+    return (Shaded(scene, eye, hits) for hits in drawing.hits(wanted, scene))
+
+
+def fill(buffers: Mapping[str, Values], names: Iterable[str], viewer: Viewer, shaded: Shaded) -> None:
+    """Write the channels `names` of all hits into flat `buffers`, at the pixels the hits belong to."""
     for name in names:
-        values = (
-            _rgba(scene, viewer, hits, colors)
-            if name == "rgba"
-            else SOURCES[name].values(scene, viewer, hits)
-        )
-        for layer, layer_values in zip(CHANNELS[name].layers, values, strict=True):
-            hits.put(buffers[layer], layer_values)
+        values_of = SOURCES[name].values
+        for layer, values in zip(CHANNELS[name].layers, values_of(viewer, shaded), strict=True):
+            shaded.hits.put(buffers[layer], values)
+
+
+_SCALE = 2.0**-112
+_MOST_SCALED = MOST_HALF * np.float32(_SCALE)
+
+
+def _halves(light: NodeColors | Shades) -> list[NDArray[np.float16]]:
+    """Red, green and blue of all pixels as half floats, of light at nodes or at the pixels themselves."""
+    colors = _halves_between(light) if isinstance(light, NodeColors) else list(map(half_floats, light))
+    return colors * (3 // len(colors))
 
 
 def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
@@ -134,7 +163,7 @@ def half_floats(values: NDArray[np.float32]) -> NDArray[np.float16]:
     bits that a half float lacks are rounded away. `astype` would take five times as long.
     """
     scaled = values * np.float32(_SCALE)
-    return _rounded(np.minimum(scaled, _MOST_SCALED, out=scaled))
+    return _rounded(out=np.minimum(scaled, _MOST_SCALED, out=scaled))
 
 
 def _halves_between(colors: NodeColors) -> list[NDArray[np.float16]]:
@@ -143,12 +172,12 @@ def _halves_between(colors: NodeColors) -> list[NDArray[np.float16]]:
     if colors.most > MOST_HALF:
         for values in scaled:
             np.minimum(values, _MOST_SCALED, out=values)
-    return list(map(_rounded, scaled))
+    return [_rounded(out=values) for values in scaled]
 
 
-def _rounded(scaled: NDArray[np.float32]) -> NDArray[np.float16]:
-    """Half floats of numbers that have their exponents; `scaled` is used up."""
-    bits = scaled.view(np.uint32)
+def _rounded(out: NDArray[np.float32]) -> NDArray[np.float16]:
+    """Half floats of numbers that have their exponents; these make way for bits."""
+    bits = out.view(np.uint32)
     bits += np.uint32(0x1000)
     bits >>= np.uint32(13)
     return bits.astype(np.uint16).view(np.float16)

@@ -100,15 +100,15 @@ class Nodes:
         """How far values of planes (3, S) in the middle are from the others (S,) at most."""
         return np.asarray(self._half * (np.abs(plane[0]) + np.abs(plane[1])))
 
-    def on_grids(self, values: FloatArray) -> FloatArray:
-        """Values (..., 9, S) at the nodes made ready, in place, for `between`: sums there are exact then.
+    def on_grids(self, values: FloatArray, out: FloatArray | None = None) -> FloatArray:
+        """Values (..., 9, S) at the nodes made ready for `between`: sums there are exact then.
 
         The grid's step is the greatest value's of a square, or less, times 2⁻⁵² times what whole weights
         add up to. Values (..., 1, S) that all nodes share stay as they are.
         """
         if values.shape[-2] == 1:
             return values
-        values *= 1 / self._whole
+        values = np.multiply(values, 1 / self._whole, out=out)
         greatest = values.max(axis=-2, keepdims=True)
         np.maximum(greatest, -values.min(axis=-2, keepdims=True), out=greatest)
         rounding = power_of_two(np.maximum(greatest, 1e-300, out=greatest))

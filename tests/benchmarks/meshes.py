@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.geometry import FloatArray, Int32Array, cross, normalized
-from quiltcli.scene import Lights, Materials, Scene
+from quiltcli.scene import Materials, Scene
+from quiltcli.scene.lights import ambient, directional
 from tests.helpers.in_memory import icosphere
 
 DATA = "QUILT_BENCH_DATA"
@@ -126,8 +127,6 @@ def scene_of(mesh: Mesh) -> Scene:
             normals[:, axis] += np.bincount(at, face[:, axis], minlength=len(normals))
     normals[~normals.any(axis=1)] = (0, 0, 1)
     count = len(mesh.triangles)
-    sun = normalized(np.array([[-1.0, -2.0, -1.5]])).astype(np.float32)
-    nothing = np.zeros((0, 3), np.float32)
     return Scene(
         vertices=mesh.vertices,
         triangles=mesh.triangles,
@@ -138,9 +137,7 @@ def scene_of(mesh: Mesh) -> Scene:
         material=np.zeros(count, np.int32),
         objects=(mesh.name,),
         materials=_clay(),
-        lights=Lights(
-            sun, np.full((1, 3), 3, np.float32), nothing, nothing, np.full(3, 0.1, np.float32), False
-        ),
+        lights=(ambient((0.1, 0.1, 0.1)), directional((-1.0, -2.0, -1.5), (3, 3, 3))),
         background=np.zeros(3, np.float32),
         notices=(),
     )

@@ -14,8 +14,8 @@ from types import GeneratorType
 from typing import Any
 
 from quiltcli.render import batch, buffers, crew
+from quiltcli.shading import adaptive
 from quiltcli.shading import aovs as channels
-from quiltcli.shading.adaptive import NodeShader
 from quiltcli.visibility import draw as raster
 from quiltcli.visibility import shares as binframe
 from quiltcli.visibility.binning import pairs as binning
@@ -34,9 +34,8 @@ STAGES: tuple[tuple[object, str, str], ...] = (
     (WholeTiles, "split", "visibility"),
     (WholeTiles, "read", "visibility"),
     (MixedTiles, "hits", "visibility"),
-    (NodeShader, "calm", "shade"),
-    (NodeShader, "colors", "shade"),
-    (channels, "pixel_colors", "shade"),
+    (adaptive, "is_smooth", "shade"),
+    (adaptive, "shade", "shade"),
     (channels, "_halves_between", "shade"),
     (batch, "fill", "store"),
     (buffers, "clear", "clear"),

@@ -9,12 +9,14 @@ from quiltcli.job import JobFile
 from quiltcli.layout import align
 from quiltcli.layout.packing import pack
 from quiltcli.render.setup import Stage, stage_of
-from quiltcli.scene import Lights, Scene
+from quiltcli.scene import Light, Scene
 from tests.helpers.in_memory import icosphere
 from tests.helpers.wall_scene import lights, wall
 
 
-def ball_scene(splits: int, radius: float = 0.8, lamps: Lights | None = None, background=(0, 0, 0)) -> Scene:
+def ball_scene(
+    splits: int, radius: float = 0.8, lamps: tuple[Light, ...] | None = None, background=(0, 0, 0)
+) -> Scene:
     """A smooth ball of 20·4ˢ triangles about the origin, by default in even light."""
     vertices, triangles = icosphere(splits)
     plain = wall(lamps or lights(ambient=(1, 1, 1)))

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from quiltcli.scene import Lights, Materials, Scene
+from quiltcli.scene import Materials, Scene
+from quiltcli.scene.lights import HEADLIGHT, Ambient, Directional, Headlight, Point
 from quiltcli.visibility.resolve.hits import point_hits
 
 EYE = np.array([0.0, 0.0, 2.0])
 
 
 def lights(sun=(), color=(), point=(), power=(), ambient=(0, 0, 0), headlight=False):
-    def rows(triples):
-        return np.array(triples, np.float32).reshape(-1, 3)
-
-    return Lights(rows(sun), rows(color), rows(point), rows(power), np.array(ambient, np.float32), headlight)
+    """Lights as a scene holds them; a sun's direction is taken as it is."""
+    around = [Ambient(np.float32(ambient))] if np.any(ambient) else []
+    suns = [Directional(np.float32(c), np.float32(d)) for d, c in zip(sun, color, strict=True)]
+    lamps = [Point(np.float32(c), np.float32(p)) for p, c in zip(point, power, strict=True)]
+    return (*around, *suns, *lamps, *([Headlight(np.full(3, HEADLIGHT, np.float32))] if headlight else []))
 
 
 def materials(color=(1, 1, 1), metallic=0.0, roughness=0.5, emission=(0, 0, 0), unlit=False, specular=1.0):

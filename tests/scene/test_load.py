@@ -90,8 +90,8 @@ def test_binary_ply_may_mix_polygons(tmp_path):
 def test_a_mesh_alone_is_one_object_under_a_headlight(tmp_path):
     scene = load_scene(write(tmp_path / "flag.obj", TRIANGLE))
     assert scene.objects == ("flag",)
-    assert scene.lights.headlight
-    assert scene.lights.ambient == pytest.approx([0.1] * 3)
+    assert [light.kind for light in scene.lights] == ["ambient", "headlight"]
+    assert scene.lights[0].color == pytest.approx([0.1] * 3)
     assert scene.background.tolist() == [0, 0, 0]
     assert scene.notices == (HEADLIGHT,)
     assert scene.vertices.dtype == np.float64
@@ -168,12 +168,13 @@ def test_lights_and_background(tmp_path):
         "background: [0, 0.5, 1]\n"
     )
     scene = scene_of(tmp_path, text, a=TRIANGLE)
-    assert scene.lights.directional_direction.tolist() == [[0, -1, 0]]
-    assert scene.lights.directional_color.tolist() == [[3, 2, 1]]
-    assert scene.lights.point_position.tolist() == [[1, 2, 3]]
-    assert scene.lights.point_color.tolist() == [[20, 20, 20]]
-    assert scene.lights.ambient.tolist() == [0.5, 0.25, 0.5]
-    assert not scene.lights.headlight
+    around, sun, lamp = scene.lights
+    assert [light.kind for light in scene.lights] == ["ambient", "directional", "point"]
+    assert sun.direction.tolist() == [0, -1, 0]
+    assert sun.color.tolist() == [3, 2, 1]
+    assert lamp.position.tolist() == [1, 2, 3]
+    assert lamp.color.tolist() == [20, 20, 20]
+    assert around.color.tolist() == [0.5, 0.25, 0.5]
     assert scene.background.tolist() == [0, 0.5, 1]
     assert scene.notices == ()
 

@@ -10,10 +10,12 @@ import pytest
 from quiltcli.geometry import normalized
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
-from quiltcli.shading.adaptive import NodeShader, pixel_colors
+from quiltcli.shading import adaptive
+from quiltcli.shading.adaptive import NodeLight, Shaded, is_smooth
 from quiltcli.shading.aovs import SOURCES, half_floats
+from quiltcli.shading.lights import LEAST_DISTANCE
 from quiltcli.shading.nodes import Nodes
-from quiltcli.shading.shade import LEAST_DISTANCE, shade
+from quiltcli.shading.shade import shade
 from quiltcli.visibility.resolve.reader import TileRays
 from quiltcli.visibility.resolve.tiles import Tiles
 from quiltcli.visibility.resolve.vectors import BlockVectors, TileVectors, on_grid
@@ -77,14 +79,14 @@ def tiles(rng, lamp, *, bent, near_glint, placed=False, colored=False, side=1):
 def relative_errors(scene, some):
     """How far squares (n, k) shaded at nodes are from pixel by pixel, over the value, of all colours."""
     exact = shade(scene, EYE, some.read().points)
-    found = pixel_colors(scene, EYE, some.read(), NodeShader(scene, EYE).colors(some))
+    found = NodeLight(scene, EYE, some).total.pixels()
     pairs = zip(found, exact, strict=True)
     return np.stack([np.abs(f.astype(float) - e) / np.maximum(e, 1e-4) for f, e in pairs])
 
 
 def calm_ones(scene, some):
     """The calm squares, and how many these are."""
-    calm = np.flatnonzero(NodeShader(scene, EYE).calm(some))
+    calm = np.flatnonzero(is_smooth(some, scene, EYE))
     return some[calm], calm.size
 
 
@@ -124,6 +126,26 @@ def test_vertex_colours_are_calm_too(colors):
     assert relative_errors(scene, calm).max() < STEP / 4
 
 
+def test_the_parts_of_light_are_as_near_and_colour_between_corners_is_exact():
+    """Whatever the colours of the corners: they are not interpolated, light is."""
+    rng = np.random.default_rng(12)
+    lamp = normalized(rng.normal(size=3))
+    scene = wall(lights([-lamp], [[3, 2, 1]], ambient=(0.1, 0.1, 0.1)), emission=(0, 1, 0))
+    some = tiles(rng, lamp, bent=True, near_glint=True, colored=True)
+    some = some[np.flatnonzero(is_smooth(some, scene, EYE))]
+    assert some.triangle.size > COUNT / 20
+    scene = replace(scene, colors=np.float32([[1, 0, 0.1], [0, 1, 0], [0.3, 0.3, 1]]))
+    by_nodes, by_pixels = (
+        Shaded(scene, EYE, some.read(), nodes) for nodes in (NodeLight(scene, EYE, some), None)
+    )
+    for name in ("diffuse", "specular", "emission"):
+        found, exact = getattr(by_nodes.apart, name).pixels(), getattr(by_pixels.apart, name)
+        for f, e in zip(found, exact, strict=True):
+            assert (np.abs(f.astype(float) - e) / np.maximum(e, 1e-3)).max() < STEP / 2
+    for f, e in zip(by_nodes.albedo, by_pixels.albedo, strict=True):
+        np.testing.assert_array_equal(f, e)
+
+
 def test_a_glint_between_the_nodes_is_not_calm():
     # Mirrors whose normals turn by 0.3 across the microtile: the lamp's image is smaller than a pixel.
     rng = np.random.default_rng(7)
@@ -132,7 +154,7 @@ def test_a_glint_between_the_nodes_is_not_calm():
     some = tiles(rng, lamp, bent=True, near_glint=True)
     wide = np.sqrt((some.normal.planes[:, :2] ** 2).sum(axis=(0, 1))) > 0.02
     assert wide.sum() > 10
-    assert not NodeShader(scene, EYE).calm(some)[wide].any()
+    assert not is_smooth(some, scene, EYE)[wide].any()
 
 
 @pytest.mark.parametrize("side", [1, 2, SQUARE])
@@ -158,9 +180,10 @@ def test_colours_between_nodes_are_rounded_like_others(color):
     lamp = np.array([0.0, 0.6, 0.8])
     scene = wall(lights([-lamp], [[1, 1, 1]], ambient=color), color=(1, 1, 1))
     some = tiles(np.random.default_rng(10), lamp, bent=True, near_glint=False)
-    some = some[NodeShader(scene, EYE).calm(some)]
-    colors = NodeShader(scene, EYE).colors(some)
-    halves = SOURCES["rgba"].values(scene, None, some.read(), colors)[:3]
+    some = some[is_smooth(some, scene, EYE)]
+    colors = NodeLight(scene, EYE, some).total
+    seen = Shaded(scene, EYE, some.read(), NodeLight(scene, EYE, some))
+    halves = SOURCES["rgba"].values(None, seen)[:3]
     exact = shade(scene, EYE, some.read().points)
     for found, values, each in zip(halves, colors.pixels(), exact, strict=True):
         np.testing.assert_array_equal(found, half_floats(values))
@@ -178,7 +201,7 @@ def test_nothing_is_calm_about_where_the_light_of_a_lamp_stops_growing():
     calm = {}
     for far in (5.0, 0.5):
         calm[far] = [
-            bool(NodeShader(wall(lights(point=[place], power=[[1, 1, 1]])), EYE).calm(some[k : k + 1])[0])
+            bool(is_smooth(some[k : k + 1], wall(lights(point=[place], power=[[1, 1, 1]])), EYE)[0])
             for k, place in enumerate((EYE[:, None] + point + far * LEAST_DISTANCE * normal).T[:100])
         ]
     assert sum(calm[5.0]) > 5
@@ -190,12 +213,11 @@ def test_no_microtile_depends_on_its_company():
     lamp = np.array([0.0, 0.6, 0.8])
     scene = wall(lights([-lamp], [[3, 2, 1]]), color=(0.9, 0.5, 0.2))
     some = tiles(rng, lamp, bent=True, near_glint=False)
-    shader = NodeShader(scene, EYE)
-    calm, colors = shader.calm(some), shader.colors(some)
+    calm, colors = is_smooth(some, scene, EYE), NodeLight(scene, EYE, some).total
     pixels = colors.pixels()
     for part in (slice(3, 4), slice(17, 60), np.array([5, 400, 7])):
-        np.testing.assert_array_equal(shader.calm(some[part]), calm[part])
-        alone = shader.colors(some[part])
+        np.testing.assert_array_equal(is_smooth(some[part], scene, EYE), calm[part])
+        alone = NodeLight(scene, EYE, some[part]).total
         np.testing.assert_array_equal(alone.values, colors.values[:, :, part])
         for mine, all_of_them in zip(alone.pixels(), pixels, strict=True):
             np.testing.assert_array_equal(mine, all_of_them[part])
@@ -207,16 +229,16 @@ def test_a_frame_is_the_same_to_within_one_step_of_its_half_floats(monkeypatch):
     viewer = viewer_of(place)
     by_nodes, by_pixels = new_buffers(stage), new_buffers(stage)
     calm = {1: 0, SQUARE: 0}
-    asked = NodeShader.calm
+    asked = adaptive.is_smooth
 
-    def watched(shader, squares):
-        found = asked(shader, squares)
+    def watched(squares, *given):
+        found = asked(squares, *given)
         calm[squares.side] += np.count_nonzero(found)
         return found
 
-    monkeypatch.setattr(NodeShader, "calm", watched)
+    monkeypatch.setattr(adaptive, "is_smooth", watched)
     draw_frame(stage, viewer, by_nodes)
-    monkeypatch.setattr(NodeShader, "calm", lambda _, some: np.zeros(some.triangle.size, bool))
+    monkeypatch.setattr(adaptive, "is_smooth", lambda some, *_: np.zeros(some.triangle.size, bool))
     draw_frame(stage, viewer, by_pixels)
     assert min(calm.values()) > 200
     for name, pixels in by_pixels.items():

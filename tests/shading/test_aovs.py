@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from quiltcli.channels import CHANNELS, empty_buffers, exr_channels
+from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import SOURCES, canonical_depth, fill
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.resolve.hits import single_places
@@ -19,7 +20,7 @@ SCENE = wall(lights(ambient=(1, 0.5, 0.25)))
 
 def filled(name, viewer=VIEWER, seen=STRAIGHT, scene=SCENE, pixels=2):
     buffers = empty_buffers([name], pixels)
-    fill(buffers, [name], scene, viewer, seen)
+    fill(buffers, [name], viewer, Shaded(scene, viewer.eye, seen))
     return buffers
 
 
@@ -85,3 +86,18 @@ def test_normals_face_the_eye():
 def test_hits_go_to_their_own_pixels():
     seen = replace(hits([[0.0, 0], [0, 0], [-2, -3]]), places=single_places(np.array([3, 1])))
     assert filled("Z", seen=seen, pixels=4)["Z"].tolist() == [np.inf, 3, np.inf, 2]
+
+
+def test_the_parts_of_light_have_layers_of_their_own():
+    glowing = wall(lights(ambient=(1, 0.5, 0.25)), color=(0.5, 1, 1), emission=(0, 2, 0))
+    for name, expected in (
+        ("albedo", (0.5, 1, 1)),
+        ("diffuse", (1, 0.5, 0.25)),
+        ("specular", (0, 0, 0)),
+        ("emission", (0, 2, 0)),
+        ("rgba", (0.5, 2.5, 0.25)),
+    ):
+        buffers = filled(name, scene=glowing)
+        assert [float(b[0]) for b in buffers.values()][:3] == list(expected)
+        assert [float(b[1]) for b in buffers.values()][:3] == [0, 0, 0]
+        assert {b.dtype.name for b in buffers.values()} == {"float16"}

@@ -10,7 +10,12 @@ import pytest
 
 from quiltcli.geometry import normalized
 from quiltcli.scene import Materials
+from quiltcli.scene.lights import HEADLIGHT
+from quiltcli.shading import lights as arriving
 from quiltcli.shading import shade as shading
+from quiltcli.shading.brdf import LEAST_ROUGHNESS
+from quiltcli.shading.materials import albedo_at
+from quiltcli.shading.surface import shading_normals as unit_normals
 from tests.helpers.wall_scene import EYE, STRAIGHT, hits, lights, materials, on, wall
 
 
@@ -20,7 +25,7 @@ def shade(scene, eye, seen):
 
 
 def shading_normals(scene, seen):
-    return shading.shading_normals(on(scene, seen)).reshape(3, -1)
+    return unit_normals(on(scene, seen)).reshape(3, -1)
 
 
 def reference(normal, eyeward, light, color, metallic, roughness):
@@ -28,7 +33,7 @@ def reference(normal, eyeward, light, color, metallic, roughness):
     n, v, w = (np.asarray(x, float) / np.linalg.norm(x) for x in (normal, eyeward, light))
     h = (v + w) / np.linalg.norm(v + w)
     nl, nv, nh, vh = max(n @ w, 0.0), n @ v, n @ h, v @ h
-    alpha = max(roughness, shading.LEAST_ROUGHNESS) ** 2
+    alpha = max(roughness, LEAST_ROUGHNESS) ** 2
     d = alpha**2 / (math.pi * (nh**2 * (alpha**2 - 1) + 1) ** 2)
 
     def smith_lambda(cosine):
@@ -87,7 +92,7 @@ def test_point_light_falls_with_the_square_of_the_distance():
 
 def test_headlight_is_a_sun_from_the_eye():
     from_eye = normalized(np.array([0.3, 0.2, -1.0]))
-    sun = wall(lights([from_eye], [[shading.HEADLIGHT] * 3], ambient=(0.1, 0.1, 0.1)))
+    sun = wall(lights([from_eye], [[HEADLIGHT] * 3], ambient=(0.1, 0.1, 0.1)))
     own = wall(lights(ambient=(0.1, 0.1, 0.1), headlight=True))
     seen = hits(from_eye * 2)
     np.testing.assert_allclose(shade(own, EYE, seen), shade(sun, EYE, seen), rtol=1e-5)
@@ -222,3 +227,63 @@ def test_light_from_behind_does_not_glint_where_a_normal_bends_past_the_silhouet
     bent = normalized(np.array([0.3, 0.95, -0.05]))  # the triangle faces the eye, its normal just does not
     scene = replace(scene, normals=np.tile(np.float32(bent), (3, 1)))
     assert shade(scene, EYE, hits([[0.0], [0], [-2]])).max() < 0.5
+
+
+LAMPS = lights(
+    [[0.1, -1, -0.3]], [[3, 2, 1]], [[1, 1, 1]], [[2, 2, 5]], ambient=(0.1, 0.2, 0.3), headlight=True
+)
+
+
+def parts(scene, seen):
+    """Diffuse and specular light and emission (3, P), and the base colour."""
+    points = on(scene, seen).points
+    light = shading.shade_apart(scene, EYE, points)
+    whole = (light.diffuse, light.specular, light.emission, albedo_at(scene, points))
+    return [
+        np.stack([np.broadcast_to(c, points.triangle.shape).ravel() for c in colors * (3 // len(colors))])
+        for colors in whole
+    ]
+
+
+@pytest.mark.parametrize("material", [{}, {"metallic": 0.7}, {"specular": 0.0}, {"unlit": True}])
+@pytest.mark.parametrize("tinted", [False, True])
+def test_the_parts_of_light_make_up_the_whole(material, tinted):
+    scene = wall(LAMPS, color=(0.9, 0.4, 0.1), emission=(0.1, 0, 0.2), roughness=0.4, **material)
+    if tinted:
+        scene = replace(scene, colors=np.float32([[1, 0, 0], [0, 1, 0], [0.2, 0.3, 1]]))
+    rng = np.random.default_rng(1)
+    seen = hits(rng.normal(size=(3, 200)), *(rng.random((2, 200)) / 2), scene=scene)
+    diffuse, specular, emission, albedo = parts(scene, seen)
+    np.testing.assert_allclose(albedo * diffuse + specular + emission, shade(scene, EYE, seen), rtol=1e-6)
+
+
+def test_diffuse_light_knows_nothing_of_a_matte_surfaces_colour():
+    seen = hits(np.random.default_rng(2).normal(size=(3, 50)))
+    one, other = (wall(LAMPS, color=color, specular=0.0) for color in ((1, 1, 1), (0.1, 0.5, 0.2)))
+    (white, *_), (green, _, _, albedo) = parts(one, seen), parts(other, seen)
+    np.testing.assert_array_equal(green, white)
+    np.testing.assert_array_equal(albedo, np.float32([[0.1], [0.5], [0.2]]) * np.ones((3, 50), np.float32))
+
+
+def test_each_lamp_adds_to_the_part_it_belongs_to():
+    """Ambient light is diffuse, what glows is emission, and only a layer glints."""
+    around = wall(lights(ambient=(0.1, 0.2, 0.3)), color=(0.5, 0.5, 0.5), emission=(1, 0, 2))
+    diffuse, specular, emission, _ = parts(around, STRAIGHT)
+    np.testing.assert_array_equal(diffuse[:, 0], np.float32([0.1, 0.2, 0.3]))
+    np.testing.assert_array_equal(emission[:, 0], [1, 0, 2])
+    assert not specular.any()
+    sun = lights([[0, 0, -1]], [[2, 2, 2]])
+    diffuse, specular, emission, _ = parts(wall(sun, color=(0.5, 0.25, 1), roughness=1.0), STRAIGHT)
+    assert diffuse[:, 0] == pytest.approx([2 * 0.96 / math.pi] * 3, rel=1e-6)
+    assert specular[:, 0] == pytest.approx([2 * 0.04 / (4 * math.pi)] * 3, rel=1e-6)
+    assert not emission.any()
+
+
+def test_what_hides_a_lamp_takes_its_light_away_and_no_others(monkeypatch):
+    sun, lamp = lights([[0, 0, -1]], [[2, 2, 2]]), lights(point=[[0, 0, 1]], power=[[3, 3, 3]])
+    half = np.float32([[0.5]])
+    monkeypatch.setattr(arriving, "occlusion", lambda light, _: half if light.kind == "point" else None)
+    both, alone = (shade(wall(lamps), EYE, STRAIGHT) for lamps in (sun + lamp, sun))
+    monkeypatch.undo()
+    expected = alone + shade(wall(lamp), EYE, STRAIGHT) / 2
+    np.testing.assert_allclose(both, expected, rtol=1e-6)

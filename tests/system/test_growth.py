@@ -34,10 +34,10 @@ PROBES = {
     (raster, "draw_small"): lambda candidates, *_: {"small": candidates},
     (raster, "draw_large"): lambda evaluated, *_: {"large": evaluated},
     (blank, "block_window"): lambda pixels, buffer, *_: {"bytes": pixels.size * buffer.itemsize},
-    (batch, "fill"): lambda _, buffers, channels, scene, eye, hits, *rest: {
-        "shaded": hits.depth.size,
-        "hits": hits.pixel.size,
-        "bytes": hits.pixel.size * sum(buffer.itemsize for buffer in buffers.values()),
+    (batch, "fill"): lambda _, buffers, channels, viewer, shaded: {
+        "shaded": shaded.hits.depth.size,
+        "hits": shaded.hits.pixel.size,
+        "bytes": shaded.hits.pixel.size * sum(buffer.itemsize for buffer in buffers.values()),
     },
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, nu
 from quiltcli.errors import MeshError
 from quiltcli.formats.mesh import read_mesh
 from quiltcli.job import load_scene_file
-from quiltcli.scene import Lights, Scene, load_scene
+from quiltcli.scene import Light, Scene, load_scene
+from quiltcli.scene.lights import KINDS
 
 
 def scene_info(path: Path) -> Info:
@@ -98,10 +100,6 @@ def _row(number_: int, entry: dict[str, Any]) -> list[str]:
     return [str(number_), entry["name"], f"{entry['triangles']:,}", vector(box["min"]), vector(box["max"])]
 
 
-def _light_counts(lights: Lights) -> dict[str, int]:
-    return {
-        "directional": len(lights.directional_direction),
-        "point": len(lights.point_position),
-        "ambient": int(lights.ambient.any()),
-        "headlight": int(lights.headlight),
-    }
+def _light_counts(lights: Sequence[Light]) -> dict[str, int]:
+    """How many lights of each kind; headlight last."""
+    return {kind.kind: sum(isinstance(light, kind) for light in lights) for kind in KINDS}

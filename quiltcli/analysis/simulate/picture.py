@@ -16,7 +16,7 @@ from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.setup import Stage, stage_of
-from quiltcli.scene import Lights, Materials, Scene
+from quiltcli.scene import Materials, Scene
 from quiltcli.viewer.viewer import Viewer
 
 Camera: TypeAlias = tuple[Facets, Layout]
@@ -67,7 +67,6 @@ def camera_stage(job: JobFile, through: Camera, scene: Scene) -> Stage:
 
 def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:
     """A scene of bare triangles: what they look like is not asked."""
-    nothing = np.zeros((0, 3), dtype=np.float32)
     return Scene(
         vertices=vertices,
         triangles=triangles,
@@ -85,7 +84,7 @@ def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:
             np.ones(1, dtype=np.bool_),
             np.ones(1, np.float32),
         ),
-        lights=Lights(nothing, nothing, nothing, nothing, np.zeros(3, np.float32), headlight=False),
+        lights=(),
         background=np.zeros(3, dtype=np.float32),
         notices=(),
     )

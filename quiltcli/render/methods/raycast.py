@@ -21,6 +21,7 @@ from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage
+from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Hits
@@ -58,7 +59,7 @@ def cast_frame(
         pixels = places(address, stage.layout, stage.owners, rays)
         hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals)
         if hits.triangle.size:
-            fill(buffers, stage.job.output.channels, stage.scene, viewer, hits)
+            fill(buffers, stage.job.output.channels, viewer, Shaded(stage.scene, viewer.eye, hits))
         return hits.inside
 
     with ThreadPoolExecutor(threads) as pool:
