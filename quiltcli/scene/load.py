@@ -11,7 +11,7 @@ import numpy as np
 
 from quiltcli.errors import Problem, SceneError, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
-from quiltcli.geometry import Float32Array
+from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.part import Part, placed

@@ -18,9 +18,10 @@ from quiltcli.shading.nodes import Nodes
 from quiltcli.shading.shade import shade
 from quiltcli.visibility.resolve.reader import TileRays
 from quiltcli.visibility.resolve.tiles import Tiles
-from quiltcli.visibility.resolve.vectors import BlockVectors, TileVectors, on_grid
+from quiltcli.visibility.resolve.vectors import BlockVectors, TileVectors
 from quiltcli.visibility.resolve.visibility import SQUARE
 from quiltcli.visibility.resolve.whole import WholeTiles
+from quiltcli.visibility.setup.grids import on_grid
 from tests.benchmarks.meshes import room
 from tests.benchmarks.stages import cube, stage_for, viewer_of
 from tests.helpers.in_memory import CUBE, CUBE_FACES, display

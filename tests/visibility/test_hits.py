@@ -10,16 +10,14 @@ import pytest
 from quiltcli.shading.aovs import half_floats
 from quiltcli.visibility.resolve.hits import RUN, Places, single_places
 from quiltcli.visibility.resolve.vectors import (
-    BASIS,
     BlockVectors,
     PointVectors,
     TileVectors,
     along,
-    exact_values,
     products,
-    single_values,
     vector_values,
 )
+from quiltcli.visibility.setup.grids import BASIS, exact_values, single_values
 from tests.helpers.wall_scene import hits
 
 

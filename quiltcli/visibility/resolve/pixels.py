@@ -14,8 +14,9 @@ from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.reader import Reader, rays_through
 from quiltcli.visibility.resolve.surfaces import surfaces
 from quiltcli.visibility.resolve.tiles import Tiles, owned_pixels
-from quiltcli.visibility.resolve.vectors import BASIS, PointVectors, vector_values
+from quiltcli.visibility.resolve.vectors import PointVectors, vector_values
 from quiltcli.visibility.scan.keys import distinct, serial_of
+from quiltcli.visibility.setup.grids import BASIS
 from quiltcli.visibility.setup.planes import Planes
 
 _DX, _DY = BASIS[0].astype(np.float32), BASIS[1].astype(np.float32)

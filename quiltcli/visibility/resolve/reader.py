@@ -10,9 +10,10 @@ from quiltcli.geometry import Float32Array, FloatArray, IntArray
 from quiltcli.scene import Scene
 from quiltcli.visibility.resolve.hits import Wanted
 from quiltcli.visibility.resolve.tiles import Tiles
-from quiltcli.visibility.resolve.vectors import BlockVectors, grid_values, on_grid
+from quiltcli.visibility.resolve.vectors import BlockVectors
 from quiltcli.visibility.scan.depth import DepthRange
 from quiltcli.visibility.setup.blocks import Blocks, Canvas
+from quiltcli.visibility.setup.grids import grid_values, on_grid
 from quiltcli.visibility.setup.planes import PlaneTable
 
 

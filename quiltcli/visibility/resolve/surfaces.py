@@ -16,7 +16,7 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, I
 from quiltcli.visibility.resolve.hits import Wanted
 from quiltcli.visibility.resolve.reader import Reader
 from quiltcli.visibility.resolve.vectors import PointVectors
-from quiltcli.visibility.setup.planes import Planes, moved, power_of_two
+from quiltcli.visibility.setup.planes import facing, moved, power_of_two
 
 _NEAR = 8.0  # pixels, about as far as a surface's pixels are from where its planes begin
 
@@ -54,7 +54,7 @@ def surfaces(reader: Reader, rows: IntArray, wanted: Wanted, x: NDArray[Any], y:
     weights = np.zeros((0, 3, rows.size))
     if wanted & (Wanted.NORMAL | Wanted.WEIGHTS):
         # The sum of the edge functions in the first's place, then the second and the third.
-        edge = moved(np.take(planes.edge, rows, axis=2), x, y)
+        edge = moved(x, y, out=np.take(planes.edge, rows, axis=2))
         edge[0] += edge[1]
         edge[0] += edge[2]
         edge *= facing(planes, rows, reader.limits.handed)
@@ -63,12 +63,6 @@ def surfaces(reader: Reader, rows: IntArray, wanted: Wanted, x: NDArray[Any], y:
         if Wanted.WEIGHTS in wanted:
             weights = edge[[1, 2, 0]]
     return Surfaces(triangle, normal, weights)
-
-
-def facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
-    """1 for pairs (n,) whose triangle's front the eye sees, −1 for those it sees from behind."""
-    result: FloatArray = planes.turn.take(rows) * -handed.take(planes.block.take(rows))
-    return result
 
 
 def has_one_normal(reader: Reader, rows: IntArray) -> BoolArray:

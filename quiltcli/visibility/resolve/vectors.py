@@ -8,38 +8,15 @@ vector is ever written down.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, IntArray
-from quiltcli.visibility.setup.planes import moved, power_of_two
-
-# Three numbers below 2 rounded to 2⁻⁵⁰, or six to 2⁻⁴⁹, have sums that are exact in double precision.
-_ROUND_TO = {3: 6.0, 6: 12.0}
-
-
-@lru_cache
-def _basis(terms: int, side: int) -> FloatArray:
-    """x, y and 1, or x², xy, y², x, y and 1, (terms, 64·side²) at the pixels of squares, row by row."""
-    place = np.arange(8.0 * side)
-    x, y = np.tile(place, place.size), np.repeat(place, place.size)
-    linear = (x, y, np.ones(x.size))
-    return np.stack(linear if terms == 3 else (x * x, x * y, y * y, *linear))
-
-
-BASIS: FloatArray = _basis(3, 1)
-"""Column, row and 1 (3, 64) of the pixels of a microtile, whose 64 pixels are neighbours in memory."""
-
-
-@lru_cache
-def _reach(terms: int, side: int) -> FloatArray:
-    """What the terms are below (terms, 1): powers of two."""
-    line = 8.0 * side
-    linear = (line, line, 1.0)
-    return np.array(linear if terms == 3 else (line**2, line**2, line**2, *linear))[:, None]
+from quiltcli.visibility.setup.grids import single_values
+from quiltcli.visibility.setup.planes import moved
 
 
 @dataclass(frozen=True)
@@ -90,18 +67,18 @@ class BlockVectors:
     @cached_property
     def planes(self) -> FloatArray:
         """Planes (3, 3, G) from the squares' first pixels."""
-        return moved(np.take(self.matrix, self.block, axis=2), self.x, self.y)
+        return moved(self.x, self.y, out=np.take(self.matrix, self.block, axis=2))
 
     def along(self, direction: Float32Array | FloatArray) -> FloatArray:
         """Planes (3, G) of the products with one direction (3,)."""
-        return moved(sum_of_products(self.matrix, direction).take(self.block, axis=1), self.x, self.y)
+        return moved(self.x, self.y, out=sum_of_products(self.matrix, direction).take(self.block, axis=1))
 
     def onto(self, vectors: Float32Array) -> FloatArray:
         """Planes (3, G) of the products with vectors, (3, G, 1) one a square or (3, 1, 1) one for all."""
         if vectors.shape[1] == 1:
             return self.along(vectors[:, 0, 0])
         part = np.take(self.matrix, self.block, axis=2)
-        return moved(sum_of_products(part, vectors[:, None, :, 0]), self.x, self.y)
+        return moved(self.x, self.y, out=sum_of_products(part, vectors[:, None, :, 0]))
 
     @cached_property
     def lengths2(self) -> FloatArray:
@@ -150,41 +127,6 @@ def _quadratic(a: FloatArray, b: FloatArray) -> FloatArray:
     s, t, u = (b[:, k] for k in range(3))
     parts = (p * s, p * t + q * s, q * t, p * u + r * s, q * u + r * t, r * u)
     return np.stack([part[0] + part[1] + part[2] for part in parts])
-
-
-def grid_values(form: FloatArray, side: int = 1) -> FloatArray:
-    """Values (G, 64·side²) of forms at the pixels of squares, row by row, from their first pixel.
-
-    Args:
-        form: planes (3, G) of x, y and 1, or quadratics (6, G) of x², xy, y², x, y and 1; on grids on which
-            every sum is exact, so that neither the order of the sums nor the machine can be told.
-        side: how many microtiles are the side of a square.
-    """
-    return np.asarray(form.T @ _basis(len(form), side))
-
-
-def exact_values(form: FloatArray, side: int = 1) -> FloatArray:
-    """As `grid_values`, of any forms: they are rounded to such grids before."""
-    return grid_values(on_grid(form, side), side)
-
-
-def on_grid(form: FloatArray, side: int = 1) -> FloatArray:
-    """Forms (..., 3 or 6, G) rounded to grids on which every sum over a square is exact."""
-    terms = form.shape[-2]
-    reach = np.abs(form)
-    reach *= _reach(terms, side)
-    greatest = reach.max(axis=-2, keepdims=True)
-    scale = power_of_two(np.maximum(greatest, 1e-300, out=greatest))  # at or below the greatest term
-    grid = form / scale
-    grid += _ROUND_TO[terms]
-    grid -= _ROUND_TO[terms]
-    grid *= scale
-    return grid
-
-
-def single_values(form: FloatArray, side: int = 1) -> Float32Array:
-    """As `exact_values`, rounded once to single precision."""
-    return exact_values(form, side).astype(np.float32)
 
 
 def sum_of_products(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:

@@ -21,7 +21,8 @@ from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.reader import Reader, TileRays, rays_through
 from quiltcli.visibility.resolve.surfaces import one_normal, surfaces
 from quiltcli.visibility.resolve.tiles import Tiles, owned_pixels
-from quiltcli.visibility.resolve.vectors import TileVectors, Vectors, grid_values, on_grid
+from quiltcli.visibility.resolve.vectors import TileVectors, Vectors
+from quiltcli.visibility.setup.grids import grid_values, on_grid
 from quiltcli.visibility.setup.planes import moved
 
 _AT_A_TIME = 2048
@@ -160,7 +161,7 @@ def whole_tiles(
         pair=pair,
         triangle=seen.triangle,
         rays=rays_through(reader, tiles, side),
-        inverse=moved(np.take(reader.table.planes.inverse, pair, axis=1), tiles.x, tiles.y),
+        inverse=moved(tiles.x, tiles.y, out=np.take(reader.table.planes.inverse, pair, axis=1)),
         normal=normal,
         weights=on_grid(seen.weights, side),
         even=even,

@@ -25,9 +25,9 @@ def serial_part(serial: Int32Array | IntArray, bits: int) -> IntArray:
     return result
 
 
-def make_keys(inverse: FloatArray, serial: IntArray, bits: int) -> IntArray:
-    """Keys from 1/t, in the memory of `inverse`; a negative 1/t gives a key below every other."""
-    keys = inverse.view(np.int64)
+def make_keys(serial: IntArray, bits: int, *, out: FloatArray) -> IntArray:
+    """Keys of the 1/t in `out`, in its memory; a negative 1/t gives a key below every other."""
+    keys = out.view(np.int64)
     keys &= ~np.int64((1 << bits) - 1)
     keys |= serial
     return keys

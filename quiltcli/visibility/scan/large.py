@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments, slices
-from quiltcli.visibility.resolve.surfaces import facing
-from quiltcli.visibility.resolve.vectors import BASIS, grid_values
 from quiltcli.visibility.scan.depth import DepthRange
 from quiltcli.visibility.scan.keys import depth_part, make_keys, serial_of, serial_part
 from quiltcli.visibility.scan.order import BatchOrder
 from quiltcli.visibility.setup.blocks import SIDE, Canvas, least_keys
-from quiltcli.visibility.setup.planes import Planes, moved
+from quiltcli.visibility.setup.grids import BASIS, grid_values
+from quiltcli.visibility.setup.planes import Planes, facing, moved
 
 MICROTILE = 8
 TILE = 64
@@ -95,7 +94,7 @@ def covering_keys(planes: Planes, spans: Spans, canvas: Canvas, bits: int) -> In
     nearest = np.zeros(canvas.touched.size, dtype=np.int64)
     covers = np.flatnonzero((spans.crossed == 0) & ~planes.cut.take(spans.row))
     serial = serial_part(planes.serial.take(spans.row[covers]), bits)
-    np.maximum.at(nearest, spans.tile[covers], make_keys(spans.least[covers], serial, bits))
+    np.maximum.at(nearest, spans.tile[covers], make_keys(serial, bits, out=spans.least[covers]))
     return nearest
 
 
@@ -311,7 +310,7 @@ def _behind_cover(planes: Planes, spans: Spans, covering: IntArray, bits: int) -
     cover, row = row_of_serial.take(serial_of(key.take(some), bits)), spans.row.take(some)
     behind = np.take(planes.inverse, row, axis=1)
     behind -= (1 - _CLEARLY) * np.take(planes.inverse, cover, axis=1)
-    a, b, c = moved(behind, spans.x.take(some), spans.y.take(some))
+    a, b, c = moved(spans.x.take(some), spans.y.take(some), out=behind)
     c += np.maximum(a * (MICROTILE - 1), 0) + np.maximum(b * (MICROTILE - 1), 0)
     # What is drawn of a sliver is held to its corners.
     held = planes.low.take(row) < (1 - _CLEARLY) * depth_part(key.take(some), bits)
@@ -376,7 +375,7 @@ def _tile_keys(
     crossed = int(np.bitwise_or.reduce(spans.crossed))
 
     def values(plane: FloatArray) -> FloatArray:
-        return grid_values(moved(np.take(plane, row, axis=1), x, y))
+        return grid_values(moved(x, y, out=np.take(plane, row, axis=1)))
 
     inverse = values(planes.inverse)
     np.maximum(inverse, planes.low.take(row)[:, None], out=inverse)
@@ -392,4 +391,4 @@ def _tile_keys(
         np.copysign(inverse, np.minimum(inverse, edges[0], out=edges[0]), out=inverse)
     if by is not None:
         inverse = by.values(planes.block.take(row)[:, None], x[:, None] + _X, y[:, None] + _Y, inverse)
-    return make_keys(inverse, serial_part(planes.serial.take(row), bits)[:, None], bits)
+    return make_keys(serial_part(planes.serial.take(row), bits)[:, None], bits, out=inverse)

@@ -201,7 +201,7 @@ def _draw_boxes(
     column = x + (x >> 3) * 56
     row = (y >> 3) * (across * 64) + (y & 7) * 8 + start * 64
     address = (row[:, None, :] + column).ravel().take(drawn).astype(np.int64)
-    keys = make_keys(inverse, serial_part(planes.serial, bits), bits).ravel().take(drawn)
+    keys = make_keys(serial_part(planes.serial, bits), bits, out=inverse).ravel().take(drawn)
     np.maximum.at(canvas.keys.reshape(-1), address, keys)
     canvas.touched[address >> 6] = True
 

@@ -221,10 +221,16 @@ def _cross(a: FloatArray, b: FloatArray, result: FloatArray) -> None:
         result[k] -= np.multiply(a[j], b[i], out=part)
 
 
-def moved(plane: FloatArray, x: NDArray[Any], y: NDArray[Any]) -> FloatArray:
-    """Planes (..., 3, N) made to begin at x, y (N,), in place; exact for what lies on dyadic grids."""
-    plane[..., 2, :] += plane[..., 0, :] * x + plane[..., 1, :] * y
-    return plane
+def facing(planes: Planes, rows: IntArray, handed: FloatArray) -> FloatArray:
+    """1 for pairs (n,) whose triangle's front the eye sees, −1 for those it sees from behind."""
+    result: FloatArray = planes.turn.take(rows) * -handed.take(planes.block.take(rows))
+    return result
+
+
+def moved(x: NDArray[Any], y: NDArray[Any], *, out: FloatArray) -> FloatArray:
+    """The planes `out` (..., 3, N) made to begin at x, y (N,); exact for what lies on dyadic grids."""
+    out[..., 2, :] += out[..., 0, :] * x + out[..., 1, :] * y
+    return out
 
 
 def power_of_two(x: NDArray[Any]) -> FloatArray:
