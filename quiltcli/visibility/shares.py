@@ -139,6 +139,7 @@ def see_vertices(plan: BinPlan, part: slice, seen: Seen) -> None:
 
 def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     """Bin some of the triangles, once all vertices are seen; writes down which of them are cut."""
+    # Triangles that are drawn at all.
     scene, eye = plan.scene, plan.viewer.eye
     wanted, cut = triangles_in_range(seen.reach, seen.vertices, scene.triangles[part], plan.viewer)
     seen.cut[part] = cut
@@ -146,10 +147,12 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
         wanted &= faces_eye(scene.planes[:, part], eye)
     drawn = np.flatnonzero(wanted)
     drawn += part.start
+    # First pass: all corners see one block, or the cones of facets decide (second pass).
     block = common_value(seen.block, scene.triangles, drawn)
     inside, rest = np.flatnonzero(block >= 0), np.flatnonzero(block < 0)
     pairs = pairs_of(seen.vertices, scene.triangles, drawn[rest], seen.core, plan.cones)
     at_once = block[inside].astype(np.int64) << 32 | drawn[inside]
+    # Pairs as numbers that sort by block, then triangle.
     sight = sight_of(scene, seen, culling=plan.culling)
     keys = np.concatenate((at_once, block_keys(pairs, sight, plan.rays, plan.blocks)))
     keys.sort()

@@ -29,6 +29,7 @@ def facet_cores(cones: Cones) -> tuple[FloatArray, IntArray]:
         corners (K, n, 3) of the cores minus the eye, short ones repeating their last corner, and
         their numbers (K,), 0 where nothing remains.
     """
+    # One cut after the other: in each turn every part that has another plane left is cut once.
     corners = cones.corners
     counts = np.full(cones.facet.size, corners.shape[1])
     part, plane = _dividing_planes(cones, *_conflicts(cones))
@@ -42,6 +43,7 @@ def facet_cores(cones: Cones) -> tuple[FloatArray, IntArray]:
             continue
         mine = mine[cut]
         clipped, left = _clip(corners[mine], counts[mine], side[cut])
+        # A cut may add a corner.
         wider = clipped.shape[1] - corners.shape[1]
         if wider > 0:
             corners = np.concatenate((corners, np.repeat(corners[:, -1:], wider, axis=1)), axis=1)

@@ -129,6 +129,7 @@ def cast(target: Target, directions: FloatArray, beyond: FloatArray | None = Non
     found = np.full(len(directions), MISS, dtype=np.int64)
     if not target.named.size:
         return found
+    # Rays that are still on their way; one that meets something before near goes on from there.
     gain = reach_along(target.viewer, directions)
     live = np.flatnonzero(gain > 0)
     start = np.zeros(len(directions)) if beyond is None else beyond.copy()

@@ -72,6 +72,7 @@ def pixel_hits(
         places: where they lie in the quilt.
         inside: pixels that are not bleed.
     """
+    # The distinct surfaces that are seen, and which of them each pixel sees.
     planes, wanted = reader.table.planes, reader.wanted
     serial, which = distinct(serial_of(keys, reader.bits), reader.table.row_of_serial.size)
     rows = reader.table.row_of_serial.take(serial)
@@ -84,6 +85,7 @@ def pixel_hits(
         values = values.reshape(*values.shape[:-2], -1)
         return values if complete else values.take(pixel, axis=-1)
 
+    # The ray's multiple t at which it meets the surface is its plane's 1/t, inverted.
     x, y = (
         chosen(tiles.x.astype(np.float32)[:, None] + _DX),
         chosen(tiles.y.astype(np.float32)[:, None] + _DY),
@@ -91,6 +93,7 @@ def pixel_hits(
     inverse = _inverse(planes, rows, which, x.astype(np.float64), y.astype(np.float64))[:, None]
     rays = rays_through(reader, tiles)
     depth, position = rays.values()
+    # Attributes: numerators that are linear over the pixels, by the sum of the edge functions.
     normal = weights = None
     if Wanted.NORMAL in wanted:
         normal = PointVectors(_values(seen.normal, which, x, y, x0, y0))

@@ -1,10 +1,22 @@
 """Large triangles: tiles are rejected, hidden or filled as a whole before any pixel is looked at.
 
-A triangle's box is cut into tiles of 64 pixels, those into microtiles of 8. The values of the edge
-functions at a tile's corners tell whether it lies outside, inside, or on an edge; a tile that a
-surface covers completely hides everything farther away in it. A microtile that one triangle fills
-with nothing else left in it is noted down by that triangle alone. What remains is evaluated 64
-pixels at a time, one pair a microtile and round, so that no two writes of a round meet.
+    pair                piece                span                      round
+    a triangle in       its box cut at       a microtile of 8 × 8      64 pixels of each microtile,
+    a block             tiles of 64 × 64     pixels of a piece         none of them twice
+                        pixels
+    ┌─────────────┐     ┌──────┬──────┐      ┌─┬─┬─┬─┐  · outside:     1st  a b c
+    │   ╱╲        │     │   ╱╲ │      │      │·│·│╱│╲│    left out     2nd  a   c
+    │  ╱  ╲       │ →   │  ╱  ╲│      │  →   ├─┼─┼─┼─┤  ╱ crossed:  → 3rd      c
+    │ ╱    ╲      │     ├─╱────┼╲─────┤      │·│╱│■│■│    evaluated    …
+    │╱______╲     │     │╱_____│_╲    │      ├─┼─┼─┼─┤  ■ covered:
+    └─────────────┘     └──────┴──────┘      │╱│■│■│■│    hides what is behind, and needs
+                                             └─┴─┴─┴─┘    no pixels where it is alone
+
+The values of the edge functions at the corners of a tile or microtile tell whether it lies outside, inside,
+or on an edge (hierarchical rasterization). One that a surface covers completely hides everything farther
+away in it (a hierarchical depth test). A microtile that one triangle fills with nothing else left in it is
+noted down by that triangle alone, its filler. What remains are fragments: they are evaluated 64 at a time,
+one pair a microtile and round, so that no two writes of a round meet.
 """
 
 from __future__ import annotations
@@ -27,9 +39,9 @@ TILE = 64
 _ACROSS = TILE // MICROTILE
 _SIZES = (1, 2, 4, 8)
 _CLASS_OF = np.searchsorted(np.asarray(_SIZES), np.arange(_ACROSS + 1))
-_CELLS = 1 << 16
-_ROUND = 1024
-_EARLY = 3
+_CELLS = 1 << 16  # microtiles at a time that pieces are looked at in: their values fit the cache
+_ROUND = 1024  # microtiles whose pixels are evaluated at a time, likewise
+_EARLY = 3  # rounds that are long enough to be sorted by the edges that cross their microtiles
 _CLEARLY = 2.0**-24  # as a share of 1/t: more than keys and the rounding of planes can tell
 _X, _Y = (BASIS[k] for k in (0, 1))
 
@@ -150,6 +162,7 @@ def _pieces(planes: Planes, hide: bool) -> Pieces:
     near = np.flatnonzero(~wide)
     if near.size == wide.size:
         return Pieces(near, box)
+    # Tiles that lie outside an edge or behind what covers them are left out as wholes.
     row, x, y = _tiles(np.flatnonzero(wide), planes.box[:, wide])
     least, greatest = _extremes(np.take(planes.edge, row, axis=2), x, y)
     covered = np.all(least > 0, axis=0)
@@ -157,6 +170,7 @@ def _pieces(planes: Planes, hide: bool) -> Pieces:
     if hide:
         keep &= ~_behind(planes, row, x, y, covered)
     row, x, y = row[keep], x[keep] >> 3, y[keep] >> 3
+    # What of the pair's box is in the tile, in microtiles.
     ends = np.stack((x, x + _ACROSS - 1, y, y + _ACROSS - 1))
     cut = box[:, row]
     cut[0::2] = np.maximum(cut[0::2], ends[0::2])
@@ -232,6 +246,7 @@ def _class_spans(
 ) -> Spans:
     """Spans of n pieces that are looked at in this many (rows, columns) of microtiles."""
     rows, columns = shape
+    # Each microtile against each edge: outside if its best pixel is, crossed if its worst is.
     x0, x1, y0, y1 = box
     i, j = np.arange(columns)[:, None], np.arange(rows)[:, None]
     inside = (j <= y1 - y0)[:, None] & (i <= x1 - x0)
@@ -240,6 +255,7 @@ def _class_spans(
         values, down, up = _corner_values(np.take(planes.edge[k], row, axis=1), x0, y0, i, j)
         inside &= values > -up
         crossed |= (values <= -down).view(np.uint8) << np.uint8(k)
+    # Those that are left, as indices of the canvas's microtiles; facets may own no pixel of some.
     block = planes.block.take(row)
     keep = np.flatnonzero(inside)
     cell, piece = np.divmod(keep, row.size)
@@ -250,6 +266,7 @@ def _class_spans(
     used = np.flatnonzero(canvas.used.take(tile))
     if used.size < tile.size:
         keep, piece, x, y, tile = (values.take(used) for values in (keep, piece, x, y, tile))
+    # How near each pair comes there, and how far away it reaches.
     values, down, up = _corner_values(np.take(planes.inverse, row, axis=1), x0, y0, i, j)
     row = row.take(piece)
     values = values.ravel().take(keep)
@@ -377,6 +394,7 @@ def _tile_keys(
     def values(plane: FloatArray) -> FloatArray:
         return grid_values(moved(x, y, out=np.take(plane, row, axis=1)))
 
+    # 1/t, negative wherever an edge that crosses some microtile is, or a limit of depth.
     inverse = values(planes.inverse)
     np.maximum(inverse, planes.low.take(row)[:, None], out=inverse)
     np.minimum(inverse, planes.high.take(row)[:, None], out=inverse)

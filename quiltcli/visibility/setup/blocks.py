@@ -102,12 +102,14 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
         bleed: pixels drawn past a facet's edge.
         owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
     """
+    # Rectangles from columns that are multiples of 8, cut every SIDE pixels.
     rectangle = facet_rectangles(layout, bleed)
     margin = np.where(rectangle[:, 2] > rectangle[:, 0], rectangle[:, 0] % 8, 0)
     rectangle[:, 0] -= margin
     extent = rectangle[:, 2:] - rectangle[:, :2]
     counts = -(-extent // SIDE)
     start = np.concatenate(([0], np.cumsum(counts[:, 0] * counts[:, 1])))
+    # Where each block lies on its page, and in the flat buffers.
     facet, rank = segments(start)
     columns = np.maximum(counts[:, 0], 1)
     x0 = rectangle[facet, 0] + rank % columns[facet] * SIDE
@@ -117,6 +119,7 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
     width = np.minimum(rectangle[facet, 2] - x0, SIDE)
     height = np.minimum(rectangle[facet, 3] - y0, SIDE)
     address = layout.page_offset[page] + y0 * stride + x0
+    # Its microtiles, and which of their pixels are the facet's.
     across = -(-width // 8)
     tile_start = np.concatenate(([0], np.cumsum(across * -(-height // 8))))
     owned, inside = _owned_pixels(facet, width, height, address, stride, owners)
@@ -194,11 +197,13 @@ def cut_batches(
         Ranges [first, last) of blocks. Their pixels are counted by microtiles that are drawn: the rectangle
         of a triangular facet is half empty.
     """
+    # Pixels that are drawn of every block; with several workers, smaller shares for each.
     used = np.concatenate(([0], np.cumsum(blocks.used)))
     areas = 64 * np.diff(used.take(blocks.tile_start))
     most = BATCH_PIXELS
     if workers > 1:
         most = min(most, max(_LEAST_PIXELS, int(areas[wanted].sum()) // (_SHARES * workers)))
+    # A batch ends before the block with which it would be too much.
     area, counts = areas.tolist(), pair_counts.tolist()
     batches = []
     first, begun, pixels, pairs = 0, False, 0, 0
@@ -254,6 +259,7 @@ class Canvas:
 
 def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
     """An empty canvas for the blocks with these indices."""
+    # The blocks' microtiles one after the other.
     tiles = blocks.tile_start[block + 1] - blocks.tile_start[block]
     tile_start = np.concatenate(([0], np.cumsum(tiles)))
     count = int(tile_start[-1])
