@@ -1,0 +1,191 @@
+"""glTF as parts of a scene: primitives placed, posed and given their surfaces; lights of the file.
+
+A light of the file is photometric (lux, candela) and the scene's are radiometric (W/m², W/sr): one is
+divided by 683 lm/W, the greatest luminous efficacy there is and the factor that exporters multiply by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from quiltcli.formats.gltf import Gltf, Material, read_gltf
+from quiltcli.formats.gltf.animation import chosen_clips
+from quiltcli.formats.gltf.posing import Piece, Placed, Pose, pieces, placed, placed_triangles, pose_at, rest_pose
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, normalized
+from quiltcli.scene.importers.part import Part
+from quiltcli.scene.materials import Surface
+
+LUMENS_PER_WATT = 683.0
+_SLOTS = {
+    "color": "baseColorTexture",
+    "metallic_roughness": "metallicRoughnessTexture",
+    "normal": "normalTexture",
+    "occlusion": "occlusionTexture",
+    "emission": "emissiveTexture",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class GltfModel:
+    """A glTF file, ready to be posed at any time.
+
+    Attributes:
+        gltf: the file.
+        pieces: its primitives, one for each part.
+        mirrored: (copies,) of each piece, those that the pose at rest turns inside out; their triangles
+            are wound the other way at every time.
+    """
+
+    gltf: Gltf
+    pieces: tuple[Piece, ...]
+    mirrored: tuple[BoolArray, ...]
+
+    @property
+    def clips(self) -> tuple[str, ...]:
+        """Names of the animations."""
+        return tuple(clip.name for clip in self.gltf.clips)
+
+
+@dataclass(frozen=True)
+class Playing:
+    """Which animations of a file are played, and what comes after their end.
+
+    Attributes:
+        clips: `all`, the name of one or the names of several.
+        after: `hold`, `loop` or `bounce`.
+    """
+
+    clips: str | tuple[str, ...] = "all"
+    after: str = "hold"
+
+
+@dataclass(frozen=True)
+class FileLight:
+    """A light of a mesh file, in the file's space.
+
+    Attributes:
+        kind: `directional`, `point` or `spot`.
+        position: metres; of no account for a directional light.
+        direction: the way it shines, unit; of no account for a point light.
+        color: irradiance of a directional light, radiant intensity of the others.
+        limited: whether the file says how far it shines.
+    """
+
+    kind: str
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    color: tuple[float, float, float]
+    limited: bool
+
+
+def read_gltf_model(path: Path) -> GltfModel:
+    """Read a glTF file and look at the headers of the images that its materials use.
+
+    Raises:
+        MeshError: the file is wrong, or an image is missing, unreadable or too large.
+    """
+    gltf = read_gltf(path)
+    for index, material in sorted(gltf.materials.items()):
+        name = repr(material.name[:40]) if material.name else str(index)
+        for slot, use in material.textures.items():
+            gltf.images.size(use.image, f"material {name}, {_SLOTS[slot]}")
+    shown = pieces(gltf)
+    rest = rest_pose(gltf)
+    return GltfModel(gltf, shown, tuple(placed(gltf, piece, rest).mirrored for piece in shown))
+
+
+def read_gltf_parts(
+    path: Path, time: float | None = None, clips: str | Sequence[str] = "all"
+) -> tuple[Part, ...]:
+    """The parts of a file at rest, or at a time (seconds) of its animations.
+
+    Raises:
+        MeshError: the file is wrong, or has no animation of that name.
+    """
+    playing = Playing(clips if isinstance(clips, str) else tuple(clips))
+    return gltf_parts(read_gltf_model(path), time, playing)
+
+
+def gltf_parts(model: GltfModel, time: float | None = None, playing: Playing | None = None) -> tuple[Part, ...]:
+    """A part for each primitive, all its copies in it, at rest or at a time."""
+    at = _pose(model, time, playing)
+    return tuple(
+        _part(model.gltf, piece, placed(model.gltf, piece, at), mirrored)
+        for piece, mirrored in zip(model.pieces, model.mirrored, strict=True)
+    )
+
+
+def pose(model: GltfModel, seconds: float, playing: Playing | None = None) -> tuple[FloatArray, FloatArray]:
+    """Vertices and normals (V, 3) of all parts after one another, at a time of the animations.
+
+    Their order is that of `gltf_parts`, at every time. Normals are of any length, zero where the file
+    gives none.
+    """
+    at = _pose(model, seconds, playing)
+    found = [placed(model.gltf, piece, at) for piece in model.pieces]
+    return (
+        np.concatenate([one.vertices for one in found]),
+        np.concatenate([np.zeros_like(one.vertices) if one.normals is None else one.normals for one in found]),
+    )
+
+
+def _pose(model: GltfModel, time: float | None, playing: Playing | None) -> Pose:
+    if time is None:
+        return rest_pose(model.gltf)
+    playing = playing or Playing()
+    clips = chosen_clips(str(model.gltf.path), model.gltf.clips, playing.clips)
+    return pose_at(model.gltf, clips, time, playing.after)
+
+
+def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
+    primitive = piece.primitive
+    colors: Float32Array | None = None
+    if primitive.colors is not None:
+        colors = np.tile(primitive.colors[:, :3], (piece.copies, 1))
+    return Part(
+        vertices=there.vertices,
+        triangles=placed_triangles(piece, mirrored),
+        normals=there.normals,
+        colors=colors,
+        surface=surface_of(gltf.materials[primitive.material]),
+    )
+
+
+def surface_of(material: Material) -> Surface:
+    """The surface of a material, as far as it is the same everywhere."""
+    return Surface(
+        color=material.color[:3],
+        metallic=material.metallic,
+        roughness=material.roughness,
+        emission=(0.0, 0.0, 0.0) if material.unlit else material.emission,
+        unlit=material.unlit,
+    )
+
+
+def texture_count(gltf: Gltf) -> int:
+    """Number of images that materials use."""
+    return len({use.image for material in gltf.materials.values() for use in material.textures.values()})
+
+
+def gltf_lights(model: GltfModel, time: float | None = None, playing: Playing | None = None) -> tuple[FileLight, ...]:
+    """The lights of the file at rest, or at a time of its animations."""
+    return tuple(_lights(model.gltf, _pose(model, time, playing).world))
+
+
+def _lights(gltf: Gltf, world: FloatArray) -> Iterator[FileLight]:
+    for light in gltf.lights:
+        place = world[light.node]
+        # A light shines along its node's -Z.
+        x, y, z = (float(v) for v in normalized(-place[:3, 2]))
+        red, green, blue = (part * light.intensity / LUMENS_PER_WATT for part in light.color)
+        yield FileLight(
+            kind=light.kind,
+            position=(float(place[0, 3]), float(place[1, 3]), float(place[2, 3])),
+            direction=(x, y, z),
+            color=(red, green, blue),
+            limited=bool(np.isfinite(light.reach)),
+        )
