@@ -13,6 +13,8 @@ from quiltcli.job.model import (
     Listed,
     MeshPath,
     Model,
+    NotNegative,
+    Number,
     OneOf,
     Rgb,
     Unit,
@@ -41,6 +43,42 @@ class MaterialSpec(Model):
     """1 for a surface that also reflects the lamps themselves, 0 for a matte one; metals always do."""
 
 
+def _clip_names(value: Any) -> Any:
+    """`all`, a name, or names: as text or a tuple of texts."""
+    if isinstance(value, (list, tuple)):
+        for index, name in enumerate(value):
+            if not isinstance(name, str) or not name:
+                raise complaint(f"expected the name of an animation, got {describe(name)}", index)
+        if not value:
+            raise complaint("expected all, a name or a list of names, got a list of 0")
+        return tuple(value)
+    if not isinstance(value, str) or not value:
+        raise complaint(f"expected all, a name or a list of names, got {describe(value)}")
+    return value
+
+
+class AnimationSpec(Model):
+    """How the animation in a mesh file is played.
+
+    The time of a frame is speed · (frame − start_frame) / fps + offset, in seconds.
+    """
+
+    start_frame: int = 0
+    """Frame at which the animation begins."""
+    offset: Number = 0.0
+    """Seconds into the animation at that frame."""
+    speed: Number = 1.0
+    """Seconds of the animation a second; below 0 it runs backwards."""
+    clip: Annotated[str | tuple[str, ...], BeforeValidator(_clip_names)] = "all"
+    """Name of the animation, or a list of names; all of them together when absent."""
+    after: Annotated[str, OneOf(("hold", "loop", "bounce"))] = "hold"
+    """At its end: stay there, begin anew, or run back and forth."""
+
+    def seconds(self, frame: float, fps: float) -> float:
+        """Time within the animation at a frame."""
+        return self.speed * (frame - self.start_frame) / fps + self.offset
+
+
 class ObjectSpec(Model):
     """A mesh in the scene."""
 
@@ -54,6 +92,8 @@ class ObjectSpec(Model):
     """What to change of the materials in the mesh file."""
     normals: Annotated[str, OneOf(("auto", "flat", "smooth"))] = "auto"
     """Shade each triangle flat, smooth over the vertices, or (auto) as the mesh file says."""
+    animation: AnimationSpec | None = None
+    """Play the animation in the mesh file; without this key it rests."""
 
 
 class DirectionalLight(Model):
@@ -87,7 +127,21 @@ class AmbientLight(Model):
     """Radiance."""
 
 
-LIGHTS = {"directional": DirectionalLight, "point": PointLight, "ambient": AmbientLight}
+class FileLights(Model):
+    """The lights in the objects' mesh files (glTF), each where its object is."""
+
+    type: Literal["file"] = "file"
+    """Kind of light."""
+    scale: NotNegative = 1.0
+    """Factor of their strength: 1 takes lux and candela by 683 lumens a watt, as exporters make them."""
+
+
+LIGHTS = {
+    "directional": DirectionalLight,
+    "point": PointLight,
+    "ambient": AmbientLight,
+    "file": FileLights,
+}
 
 
 def _check_type(value: Any) -> Any:
@@ -112,10 +166,18 @@ def _light_tag(value: Any) -> str:
 LightSpec: TypeAlias = Annotated[
     Annotated[DirectionalLight, Tag("<DirectionalLight>")]
     | Annotated[PointLight, Tag("<PointLight>")]
-    | Annotated[AmbientLight, Tag("<AmbientLight>")],
+    | Annotated[AmbientLight, Tag("<AmbientLight>")]
+    | Annotated[FileLights, Tag("<FileLights>")],
     Discriminator(_light_tag),
     BeforeValidator(_check_type),
 ]
+
+
+def _listed_lights(value: Any) -> Any:
+    """`lights: file` is short for a list of that one entry."""
+    if value == "file":
+        return ({"type": "file"},)
+    return tuple(value) if isinstance(value, list) else value
 
 
 class SceneFile(FileModel):
@@ -127,7 +189,7 @@ class SceneFile(FileModel):
     """Version of the format."""
     objects: Annotated[tuple[ObjectSpec, ...], Listed, Field(min_length=1)]
     """Meshes."""
-    lights: Annotated[tuple[LightSpec, ...], Listed] = ()
-    """Lights; a headlight and a dim ambient light when there are none."""
+    lights: Annotated[tuple[LightSpec, ...], BeforeValidator(_listed_lights)] = ()
+    """Lights, or `file` for those of the meshes; a headlight and a dim ambient light when there are none."""
     background: Rgb = (0.0, 0.0, 0.0)
     """Colour where nothing is hit, linear."""

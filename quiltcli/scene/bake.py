@@ -9,7 +9,7 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, dot, normalized
 from quiltcli.scene.importers.part import Part
-from quiltcli.scene.normals import CREASE_DEG, face_normals, smoothed
+from quiltcli.scene.normals import CREASE_DEG, corner_sums, face_normals, smoothed
 
 # Height over length below which a triangle is a line.
 _THINNEST = 1e-12
@@ -29,6 +29,8 @@ class Baked:
         infinite: triangles dropped for a NaN or infinite vertex.
         empty: triangles dropped for having no area.
         uv: (V, 2) texture coordinates, NaN where a part has none, or None where no part has any.
+        source: (V,) the vertex of the joined parts each one is a copy of.
+        group: (V,) numbers that vertices of one computed normal share, -1 where the file gives one.
     """
 
     vertices: FloatArray
@@ -39,6 +41,8 @@ class Baked:
     part: IntArray
     infinite: int
     empty: int
+    source: IntArray
+    group: IntArray
     uv: FloatArray | None = None
 
 
@@ -61,7 +65,7 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
 
     given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
     colors, uv = _given_colors(parts), _given_uv(parts)
-    source, triangles, normals = _with_normals(
+    source, triangles, normals, group = _with_normals(
         vertices,
         triangles,
         given,
@@ -78,7 +82,33 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
         infinite=int(np.count_nonzero(infinite)),
         empty=int(np.count_nonzero(empty)),
         uv=None if uv is None else uv[source],
+        source=source,
+        group=group,
     )
+
+
+def reposed(baked: Baked, vertices: FloatArray, normals: FloatArray) -> tuple[FloatArray, Float32Array]:
+    """Vertices (V, 3) and unit normals (V, 3) of an object whose parts have moved; its triangles stay.
+
+    Vertices that shared a computed normal share one again; creases stay where they were.
+
+    Args:
+        baked: the object.
+        vertices: of all its parts after one another.
+        normals: theirs, of any length, zero where the file gives none.
+    """
+    moved = vertices[baked.source]
+    given = normalized(normals[baked.source])
+    # Where the file's normal is lost on the way, the triangles around must do.
+    own = (baked.group >= 0) | ~given.any(axis=1)
+    if own.any():
+        face = normalized(face_normals(moved, baked.triangles))
+        # Vertices without a group have one of their own, beyond all others.
+        group = np.where(baked.group >= 0, baked.group, baked.group.max() + 1 + np.arange(len(moved)))
+        _, row = np.unique(group, return_inverse=True)
+        sums = corner_sums(row[baked.triangles.ravel()], moved, baked.triangles, face)
+        given[own] = normalized(sums[row[own]])
+    return moved, given.astype(np.float32)
 
 
 def _wound(part: Part) -> IntArray:
@@ -124,8 +154,8 @@ def _given_uv(parts: Sequence[Part]) -> FloatArray | None:
 
 def _with_normals(
     vertices: FloatArray, triangles: IntArray, given: FloatArray, crease_deg: float, *, keep_sources: bool
-) -> tuple[IntArray, IntArray, Float32Array]:
-    """Source vertex (V,), triangles (T, 3) and normals (V, 3): the given ones, computed ones for the rest."""
+) -> tuple[IntArray, IntArray, Float32Array, IntArray]:
+    """Sources (V,), triangles (T, 3), normals (V, 3), given or computed, and groups (V,) of the latter."""
     usable = dot(given, given) > 0
     has_own = usable[triangles].all(axis=1)
     own, other = np.flatnonzero(has_own), np.flatnonzero(~has_own)
@@ -134,10 +164,12 @@ def _with_normals(
     result[own] = corners
     normals = given[used].astype(np.float32)
     if not other.size:
-        return used, result, normals
+        return used, result, normals, np.full(len(used), -1)
     found = smoothed(vertices, triangles[other], crease_deg, keep_sources=keep_sources)
     result[other] = found.triangles + len(used)
-    return np.concatenate((used, found.source)), result, np.concatenate((normals, found.normals))
+    source = np.concatenate((used, found.source))
+    group = np.concatenate((np.full(len(used), -1), found.group))
+    return source, result, np.concatenate((normals, found.normals)), group
 
 
 def _compact(triangles: IntArray, count: int) -> tuple[IntArray, IntArray]:

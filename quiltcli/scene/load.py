@@ -9,13 +9,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quiltcli.errors import Problem, SceneError, raise_all
+from quiltcli.errors import MeshError, Problem, SceneError, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
+from quiltcli.scene.importers.gltf import (
+    FileLight,
+    GltfModel,
+    Playing,
+    contested_channels,
+    gltf_lights,
+    gltf_parts,
+)
 from quiltcli.scene.importers.part import Part, placed
-from quiltcli.scene.lights import lights_of
+from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point
 from quiltcli.scene.materials import Surface, material_table
 from quiltcli.scene.scene import Scene
 
@@ -57,6 +65,8 @@ class _Gathered:
     textures: int = 0
     coverage: Coverage = NOTHING
     notices: list[str] = field(default_factory=list)
+    lights: list[FileLight] = field(default_factory=list)
+    wants_lights: bool = False
 
     def add(self, name: str, asset: Asset, baked: Baked, surfaces: Sequence[Surface]) -> None:
         """Append an object; its parts have the given surfaces."""
@@ -72,6 +82,36 @@ class _Gathered:
         for missing in asset.missing:
             self.notices.append(f"{name}: the material file {missing!r} is missing (default materials used)")
 
+    def animate(self, name: str, model: GltfModel | None, playing: Playing | None) -> None:
+        """Say what becomes of an object's animations."""
+        if model is None or not model.clips:
+            return
+        clips = _counted(len(model.clips), "animation")
+        if playing is None:
+            words = f"{clips} of the file not played ('animation' of the object plays them)"
+            self.notices.append(f"{name}: {words}")
+            return
+        lost = contested_channels(model, playing)
+        if lost:
+            words = f"animated by two clips at once (the first counts): {_counted(lost, 'channel')}"
+            self.notices.append(f"{name}: {words}")
+
+    def light(self, name: str, lights: Sequence[FileLight], matrix: FloatArray | None) -> None:
+        """Take an object's own lights, or say that they are left out."""
+        if not lights:
+            return
+        if not self.wants_lights:
+            words = f"{_counted(len(lights), 'light')} of the file left out ('lights: file' takes them)"
+            self.notices.append(f"{name}: {words}")
+            return
+        spots = sum(light.kind == "spot" for light in lights)
+        limited = sum(light.limited for light in lights if light.kind != "spot")
+        if spots:
+            self.notices.append(f"{name}: {_counted(spots, 'spot light')} of the file left out")
+        if limited:
+            self.notices.append(f"{name}: the range of {_counted(limited, 'light')} is not kept to")
+        self.lights += [light if matrix is None else light.placed(matrix) for light in lights]
+
 
 def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
@@ -82,19 +122,22 @@ def _mesh_scene(path: Path) -> Scene:
     gathered = _Gathered()
     asset = read_asset(path)
     gathered.add(path.stem, asset, _baked(asset.parts, "auto", path), [part.surface for part in asset.parts])
+    gathered.animate(path.stem, asset.model, None)
+    gathered.light(path.stem, _lights_of(asset, None), None)
     return _assembled(gathered, (), (0.0, 0.0, 0.0))
 
 
 def _file_scene(spec: SceneFile) -> Scene:
     """Every object of a scene file; all that fail are reported together."""
-    gathered = _Gathered()
+    gathered = _Gathered(wants_lights=any(light.type == "file" for light in spec.lights))
     assets: dict[Path, Asset] = {}
     problems: list[Problem] = []
     for index, item in enumerate(spec.objects):
         try:
             _add_object(gathered, item, assets)
         except SceneError as error:
-            problems += [spec.source.problem(("objects", index, "mesh"), str(p)) for p in error.problems]
+            key = "animation" if isinstance(error, _AnimationError) else "mesh"
+            problems += [spec.source.problem(("objects", index, key), str(p)) for p in error.problems]
     raise_all(SceneError, problems)
     return _assembled(gathered, spec.lights, spec.background)
 
@@ -104,14 +147,42 @@ def _add_object(gathered: _Gathered, item: ObjectSpec, assets: dict[Path, Asset]
     if item.mesh not in assets:
         assets[item.mesh] = read_asset(item.mesh)
     asset = assets[item.mesh]
+    playing = _playing(item, asset)
+    time = None if item.animation is None else item.animation.offset
     override = {} if item.material is None else item.material.model_dump(exclude_none=True)
-    parts = asset.parts
-    if item.transform is not None:
-        parts = tuple(placed(part, item.transform.array) for part in parts)
+    parts = asset.parts if playing is None or asset.model is None else gltf_parts(asset.model, time, playing)
+    matrix = None if item.transform is None else item.transform.array
+    if matrix is not None:
+        parts = tuple(placed(part, matrix) for part in parts)
     if "color" in override:
         parts = tuple(replace(part, colors=None) for part in parts)
     surfaces = [part.surface.overridden(override) for part in parts]
-    gathered.add(item.name or item.mesh.stem, asset, _baked(parts, item.normals, item.mesh), surfaces)
+    name = item.name or item.mesh.stem
+    gathered.add(name, asset, _baked(parts, item.normals, item.mesh), surfaces)
+    gathered.animate(name, asset.model, playing)
+    gathered.light(name, _lights_of(asset, playing, time), matrix)
+
+
+class _AnimationError(SceneError):
+    """An animation that cannot be played."""
+
+
+def _playing(item: ObjectSpec, asset: Asset) -> Playing | None:
+    """How an object's animation is played, if it is."""
+    if item.animation is None:
+        return None
+    if asset.model is None or not asset.model.clips:
+        raise _AnimationError(Problem("has no animation", str(item.mesh)))
+    playing = Playing(item.animation.clip, item.animation.after)
+    try:
+        asset.model.chosen(playing)
+    except MeshError as error:
+        raise _AnimationError(error.problems) from error
+    return playing
+
+
+def _lights_of(asset: Asset, playing: Playing | None, time: float | None = None) -> tuple[FileLight, ...]:
+    return () if asset.model is None else gltf_lights(asset.model, None if playing is None else time, playing)
 
 
 def _baked(parts: Sequence[Part], mode: str, path: Path) -> Baked:
@@ -138,11 +209,11 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         material=np.concatenate(rows),
         objects=tuple(gathered.names),
         materials=material_table(list(gathered.surfaces)),
-        lights=lights_of(lights),
+        lights=_lights(lights, gathered.lights),
         background=np.array(background, dtype=np.float32),
-        notices=_notices(gathered, unlit=not lights),
         uv=_uv(baked),
         coverage=gathered.coverage,
+        notices=_notices(gathered, lights),
     )
 
 
@@ -156,11 +227,34 @@ def _uv(baked: Sequence[Baked]) -> FloatArray | None:
     return np.concatenate([np.full((len(b.vertices), 2), np.nan) if b.uv is None else b.uv for b in baked])
 
 
-def _notices(gathered: _Gathered, *, unlit: bool) -> tuple[str, ...]:
+def _notices(gathered: _Gathered, lights: Sequence[LightSpec]) -> tuple[str, ...]:
     notices = list(gathered.notices)
     if gathered.textures:
         textures = _counted(gathered.textures, "texture")
         notices.append(f"textures are not drawn yet: {textures} ignored, base colours are shown instead")
-    if unlit:
-        notices.append("the scene has no lights: a headlight at the viewer and a dim ambient light are used")
+    if not _has_lamps(lights, gathered.lights):
+        left_out = any("of the file left out" in notice for notice in notices)
+        why = "no lights are asked for" if left_out else "the scene has no lights"
+        notices.append(f"{why}: a headlight at the viewer and a dim ambient light are used")
     return tuple(notices)
+
+
+def _has_lamps(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> bool:
+    """Whether anything lights the scene."""
+    return any(light.type != "file" for light in lights) or any(light.kind != "spot" for light in found)
+
+
+def _lights(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> tuple[Light, ...]:
+    """The lights of scene and mesh files; without any, a headlight and a dim ambient light."""
+    if not _has_lamps(lights, found):
+        return default_lights()
+    scale = sum(light.scale for light in lights if light.type == "file")
+    own = [light for light in lights if light.type != "file"]
+    rows = list(lights_of(own)) if own else []
+    for light in found:
+        color = [scale * part for part in light.color]
+        if light.kind == "directional":
+            rows.append(directional(light.direction, color))
+        elif light.kind == "point":
+            rows.append(point(light.position, color))
+    return tuple(rows)

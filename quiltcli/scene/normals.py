@@ -23,11 +23,13 @@ class Smoothed(NamedTuple):
         source: (V,) the vertex of the input each one is a copy of.
         triangles: (T, 3) indices into `source`.
         normals: (V, 3) unit normals, float32.
+        group: (V,) numbers, below 3T, that vertices of one normal share.
     """
 
     source: IntArray
     triangles: IntArray
     normals: Float32Array
+    group: IntArray
 
 
 def smoothed(
@@ -49,7 +51,7 @@ def smoothed(
     welded = weld(vertices)[triangles]
     face = normalized(face_normals(vertices, triangles))
     group = crease_groups(welded, face, math.cos(math.radians(crease_deg)))
-    sums = _corner_sums(group, vertices, triangles, face)
+    sums = corner_sums(group, vertices, triangles, face)
     source = triangles.ravel()
     if keep_sources:
         _, first, corner = np.unique(
@@ -63,7 +65,7 @@ def smoothed(
     # Opposed triangles may cancel to nothing; any of their normals is better than none.
     lost = np.flatnonzero(~normals.any(axis=1))
     normals[lost] = face[first[lost] // 3]
-    return Smoothed(source[first], corner.reshape(-1, 3), normals.astype(np.float32))
+    return Smoothed(source[first], corner.reshape(-1, 3), normals.astype(np.float32), group[first])
 
 
 def face_normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
@@ -135,8 +137,15 @@ def _connected(label: IntArray, left: IntArray, right: IntArray) -> IntArray:
         label = spread
 
 
-def _corner_sums(group: IntArray, vertices: FloatArray, triangles: IntArray, face: FloatArray) -> FloatArray:
-    """Sums (3T, 3) of the triangle normals of each group, weighted by the angle at the corner."""
+def corner_sums(group: IntArray, vertices: FloatArray, triangles: IntArray, face: FloatArray) -> FloatArray:
+    """Sums (3T, 3) of the triangle normals of each group, weighted by the angle at the corner.
+
+    Args:
+        group: (3T,) number below 3T of each corner.
+        vertices: (V, 3) positions.
+        triangles: (T, 3) indices.
+        face: (T, 3) unit triangle normals.
+    """
     points = vertices[triangles]
     edge = normalized(np.roll(points, -1, axis=1) - points)
     angle = arccos(-dot(edge, np.roll(edge, 1, axis=1))).ravel()

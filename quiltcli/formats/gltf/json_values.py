@@ -45,9 +45,8 @@ def parse_json(data: bytes, file: str) -> tuple[Json, tuple[str, ...]]:
     except RecursionError:
         raise _broken(file, "its JSON text is nested too deeply") from None
     except json.JSONDecodeError as error:
-        message = f"{error.msg[:1].lower()}{error.msg[1:]}"
-        where = f"column {error.colno}: is not JSON: {message}"
-        raise MeshError(Problem(where, file, error.lineno)) from None
+        message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
+        raise MeshError(Problem(message, file, error.lineno, error.colno)) from None
     except ValueError:
         raise _broken(file, "its JSON text holds a number of thousands of digits") from None
     return Json(value, "", file), tuple(repeated)

@@ -46,6 +46,10 @@ class Piece:
         """How often it is there."""
         return sum(len(shape.instances) for shape in self.shapes)
 
+    def places(self, pose: Pose) -> FloatArray:
+        """Placements (copies, 4, 4) of the copies in a pose."""
+        return np.concatenate([product(pose.world[s.node][None], s.instances) for s in self.shapes])
+
 
 @dataclass(frozen=True, eq=False)
 class Placed:
@@ -116,8 +120,7 @@ def placed(gltf: Gltf, piece: Piece, pose: Pose) -> Placed:
     """All copies of a piece in a pose."""
     primitive = piece.primitive
     if not len(primitive.moved) and all(shape.skin < 0 for shape in piece.shapes):
-        places = np.concatenate([product(pose.world[s.node][None], s.instances) for s in piece.shapes])
-        return _carried(primitive.positions, primitive.normals, places)
+        return _carried(primitive.positions, primitive.normals, piece.places(pose))
     parts = [_one(gltf, primitive, shape, pose) for shape in piece.shapes]
     normals = [part.normals for part in parts if part.normals is not None]
     return Placed(

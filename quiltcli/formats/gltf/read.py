@@ -131,7 +131,9 @@ class _Reader:
                 continue
             found.append(max(triangle_count(item, self.accessors), self.accessors.count(position)))
             if found[-1] > MOST_TRIANGLES:
-                raise item.error(f"has {found[-1]:,} vertices or triangles (expected at most {MOST_TRIANGLES:,})")
+                raise item.error(
+                    f"has {found[-1]:,} vertices or triangles (expected at most {MOST_TRIANGLES:,})"
+                )
         return sum(found), len(found)
 
     def _shape(self, node: int, nodes: int) -> Shape:

@@ -9,9 +9,9 @@ from quiltcli.errors import MeshError, Problem, SceneError
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.formats.mesh.read import READERS, read_polygons
+from quiltcli.scene.importers.gltf import GltfModel, gltf_parts, read_gltf_model, texture_count
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.importers.polygons import parts_of_polygons
-from quiltcli.scene.importers.trimesh import parts_of, quiet, texture_count, trimesh_scene
 
 SUFFIXES = (".obj", ".ply", ".off", ".stl", ".gltf", ".glb")
 
@@ -21,11 +21,12 @@ class Asset:
     """What a mesh file brings to a scene.
 
     Attributes:
-        parts: its parts.
+        parts: its parts, at rest.
         textures: how many images its materials want.
         missing: material files it names that are not there.
         notices: what else was dropped or assumed, without a name before it.
         coverage: how the areas of its polygons compare with those of their triangles.
+        model: what can be posed at other times, for a file with nodes and animations.
     """
 
     parts: tuple[Part, ...]
@@ -33,6 +34,7 @@ class Asset:
     missing: tuple[str, ...]
     notices: tuple[str, ...] = ()
     coverage: Coverage = NOTHING
+    model: GltfModel | None = None
 
 
 def read_asset(path: Path) -> Asset:
@@ -42,7 +44,7 @@ def read_asset(path: Path) -> Asset:
         SceneError: the file is missing, of an unknown kind, damaged, or holds no triangles.
     """
     _check_file(path)
-    asset = _polygon_asset(path) if path.suffix.lower() in READERS else _trimesh_asset(path)
+    asset = _polygon_asset(path) if path.suffix.lower() in READERS else _gltf_asset(path)
     if not any(len(part.triangles) for part in asset.parts):
         raise SceneError(Problem("holds no triangles", str(path)))
     return asset
@@ -75,19 +77,16 @@ def _place(mesh: PolygonMesh, face: int) -> str:
     return f" (face {face + 1}, line {line})" if line else f" (face {face + 1})"
 
 
-def _trimesh_asset(path: Path) -> Asset:
-    asked: list[str] = []
-    missing: list[str] = []
+def _gltf_asset(path: Path) -> Asset:
     try:
-        with quiet():
-            scene = trimesh_scene(path, asked, missing)
-            parts = parts_of(scene, path.suffix.lower())
-            textures = texture_count(scene, asked)
-        if any(part.vertices.shape[1:] != (3,) for part in parts):
-            raise ValueError("vertices without three coordinates")  # noqa: TRY301 - as if the reader had said so
-    except Exception as error:  # whatever the reader meets in a damaged file
-        raise _damaged(path, missing) from error
-    return Asset(tuple(parts), textures, ())
+        model = read_gltf_model(path)
+    except MeshError as error:
+        raise SceneError(error.problems) from error
+    parts = gltf_parts(model)
+    if not any(len(part.triangles) for part in parts):
+        left_out = "".join(f"; {notice}" for notice in model.gltf.notices)
+        raise SceneError(Problem(f"holds no triangles{left_out}", str(path)))
+    return Asset(parts, texture_count(model.gltf), (), model.gltf.notices, model=model)
 
 
 def _check_file(path: Path) -> None:
@@ -106,11 +105,3 @@ def _check_file(path: Path) -> None:
         raise SceneError(Problem(f"cannot be read: {error.strerror}", str(path))) from None
     if empty:
         raise SceneError(Problem("the file is empty (expected a mesh)", str(path)))
-
-
-def _damaged(path: Path, missing: list[str]) -> SceneError:
-    kind = path.suffix[1:].upper()
-    # trimesh looks for another glTF file when it cannot make sense of this one.
-    buffers = [name for name in missing if not name.endswith(".gltf")]
-    reason = f"{buffers[0]!r} is missing beside it" if buffers else "the file is damaged or incomplete"
-    return SceneError(Problem(f"cannot be read as {kind}: {reason}", str(path)))

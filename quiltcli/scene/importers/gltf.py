@@ -7,14 +7,25 @@ divided by 683 lm/W, the greatest luminous efficacy there is and the factor that
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from quiltcli.formats.gltf import Gltf, Material, read_gltf
 from quiltcli.formats.gltf.animation import chosen_clips
-from quiltcli.formats.gltf.posing import Piece, Placed, Pose, pieces, placed, placed_triangles, pose_at, rest_pose
+from quiltcli.formats.gltf.model import Clip
+from quiltcli.formats.gltf.posing import (
+    Piece,
+    Placed,
+    Pose,
+    contested,
+    pieces,
+    placed,
+    placed_triangles,
+    pose_at,
+    rest_pose,
+)
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, normalized
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.materials import Surface
@@ -49,6 +60,14 @@ class GltfModel:
         """Names of the animations."""
         return tuple(clip.name for clip in self.gltf.clips)
 
+    def chosen(self, playing: Playing) -> tuple[Clip, ...]:
+        """The animations that are played.
+
+        Raises:
+            MeshError: there is none of a name that is asked for.
+        """
+        return chosen_clips(str(self.gltf.path), self.gltf.clips, playing.clips)
+
 
 @dataclass(frozen=True)
 class Playing:
@@ -81,6 +100,20 @@ class FileLight:
     color: tuple[float, float, float]
     limited: bool
 
+    def placed(self, matrix: FloatArray) -> FileLight:
+        """The light moved by an affine (4, 4) matrix; its strength stays."""
+        along = matrix[:3, :3] @ np.array(self.direction)
+        return replace(
+            self,
+            position=_triple(matrix[:3, :3] @ np.array(self.position) + matrix[:3, 3]),
+            direction=_triple(normalized(along)),
+        )
+
+
+def _triple(values: FloatArray) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in values)
+    return x, y, z
+
 
 def read_gltf_model(path: Path) -> GltfModel:
     """Read a glTF file and look at the headers of the images that its materials use.
@@ -110,7 +143,9 @@ def read_gltf_parts(
     return gltf_parts(read_gltf_model(path), time, playing)
 
 
-def gltf_parts(model: GltfModel, time: float | None = None, playing: Playing | None = None) -> tuple[Part, ...]:
+def gltf_parts(
+    model: GltfModel, time: float | None = None, playing: Playing | None = None
+) -> tuple[Part, ...]:
     """A part for each primitive, all its copies in it, at rest or at a time."""
     at = _pose(model, time, playing)
     return tuple(
@@ -129,7 +164,9 @@ def pose(model: GltfModel, seconds: float, playing: Playing | None = None) -> tu
     found = [placed(model.gltf, piece, at) for piece in model.pieces]
     return (
         np.concatenate([one.vertices for one in found]),
-        np.concatenate([np.zeros_like(one.vertices) if one.normals is None else one.normals for one in found]),
+        np.concatenate(
+            [np.zeros_like(one.vertices) if one.normals is None else one.normals for one in found]
+        ),
     )
 
 
@@ -137,8 +174,12 @@ def _pose(model: GltfModel, time: float | None, playing: Playing | None) -> Pose
     if time is None:
         return rest_pose(model.gltf)
     playing = playing or Playing()
-    clips = chosen_clips(str(model.gltf.path), model.gltf.clips, playing.clips)
-    return pose_at(model.gltf, clips, time, playing.after)
+    return pose_at(model.gltf, model.chosen(playing), time, playing.after)
+
+
+def contested_channels(model: GltfModel, playing: Playing) -> int:
+    """Number of channels that are not played, as a clip before theirs moves the same thing."""
+    return contested(model.chosen(playing))
 
 
 def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
@@ -152,7 +193,14 @@ def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
         normals=there.normals,
         colors=colors,
         surface=surface_of(gltf.materials[primitive.material]),
+        uv=_v_up(primitive.uv[0], piece.copies),
+        uv1=_v_up(primitive.uv[1], piece.copies),
     )
+
+
+def _v_up(uv: FloatArray | None, copies: int) -> FloatArray | None:
+    """Texture coordinates of all copies with v up; in the file v goes down."""
+    return None if uv is None else np.tile(np.stack((uv[:, 0], 1 - uv[:, 1]), axis=1), (copies, 1))
 
 
 def surface_of(material: Material) -> Surface:
@@ -171,7 +219,9 @@ def texture_count(gltf: Gltf) -> int:
     return len({use.image for material in gltf.materials.values() for use in material.textures.values()})
 
 
-def gltf_lights(model: GltfModel, time: float | None = None, playing: Playing | None = None) -> tuple[FileLight, ...]:
+def gltf_lights(
+    model: GltfModel, time: float | None = None, playing: Playing | None = None
+) -> tuple[FileLight, ...]:
     """The lights of the file at rest, or at a time of its animations."""
     return tuple(_lights(model.gltf, _pose(model, time, playing).world))
 
@@ -180,12 +230,11 @@ def _lights(gltf: Gltf, world: FloatArray) -> Iterator[FileLight]:
     for light in gltf.lights:
         place = world[light.node]
         # A light shines along its node's -Z.
-        x, y, z = (float(v) for v in normalized(-place[:3, 2]))
         red, green, blue = (part * light.intensity / LUMENS_PER_WATT for part in light.color)
         yield FileLight(
             kind=light.kind,
-            position=(float(place[0, 3]), float(place[1, 3]), float(place[2, 3])),
-            direction=(x, y, z),
+            position=_triple(place[:3, 3]),
+            direction=_triple(normalized(-place[:3, 2])),
             color=(red, green, blue),
             limited=bool(np.isfinite(light.reach)),
         )

@@ -22,6 +22,7 @@ class Part:
         surface: its material.
         mirrored: whether its placement turned the winding inside out.
         uv: (V, 2) texture coordinates, v up, NaN for a vertex without any, or None.
+        uv1: (V, 2) those of the second set, likewise.
     """
 
     vertices: FloatArray
@@ -31,6 +32,7 @@ class Part:
     surface: Surface
     mirrored: bool = False
     uv: FloatArray | None = None
+    uv1: FloatArray | None = None
 
 
 def placed(part: Part, matrix: FloatArray) -> Part:
