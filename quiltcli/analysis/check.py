@@ -20,6 +20,7 @@ from quiltcli.job import (
     JobFile,
     LayoutFile,
     PackSpec,
+    SceneFile,
     check_file,
     file_kind,
     load_display_file,
@@ -36,11 +37,18 @@ from quiltcli.viewer.view import view_problems, viewers_of
 T = TypeVar("T")
 
 
-def check_files(paths: Iterable[Path]) -> list[Problem]:
-    """Every problem of jobs, displays, layouts, scenes and meshes, each once, file by file."""
+def check_files(paths: Iterable[Path], say: Callable[[str], None] = lambda notice: None) -> list[Problem]:
+    """Every problem of jobs, displays, layouts, scenes and meshes, each once, file by file.
+
+    Args:
+        paths: the files.
+        say: told once each what is no problem but good to know: what of a scene is not drawn.
+    """
     findings = _Findings()
     for path in paths:
         findings.check(Path(path))
+    for notice in dict.fromkeys(findings.notices):
+        say(notice)
     return list(dict.fromkeys(findings.problems))
 
 
@@ -49,6 +57,7 @@ class _Findings:
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
+        self.notices: list[str] = []
         self.displays: dict[Path, Facets | None] = {}
         self.seen: set[Path] = set()
 
@@ -68,7 +77,7 @@ class _Findings:
             return
         self.seen.add(path)
         if path.suffix.lower() in SUFFIXES:
-            self.run(load_scene, path)
+            self.scene(path, path)
             return
         problems = check_file(path)
         self.problems += problems
@@ -83,6 +92,12 @@ class _Findings:
             name = data.get(key)
             if isinstance(name, str) and (path.parent / name).is_file():
                 self.check(path.parent / name)
+
+    def scene(self, path: Path, spec: SceneFile | Path | None) -> None:
+        """Load a scene, and note what it has to say."""
+        scene = self.run(load_scene, spec)
+        if scene is not None:
+            self.notices += [f"{path}: {notice}" for notice in scene.notices]
 
     def facets(self, path: Path) -> Facets | None:
         """The facets of a display file, built once."""
@@ -99,7 +114,7 @@ def _check_display(findings: _Findings, path: Path) -> None:
 
 
 def _check_scene(findings: _Findings, path: Path) -> None:
-    findings.run(load_scene, load_scene_file(path))
+    findings.scene(path, load_scene_file(path))
 
 
 def _check_layout(findings: _Findings, path: Path) -> None:
@@ -131,7 +146,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     findings.run(layout_for, choice, facets)
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
-    findings.run(load_scene, findings.run(load_scene_file, job.scene))
+    findings.scene(job.scene, findings.run(load_scene_file, job.scene))
     if facets is not None and not found:
         viewers = viewers_of(job, job.frames)
         findings.problems += eye_problems(facets, viewers, job)

@@ -16,7 +16,7 @@ def check(files: tuple[Path, ...]) -> None:
     """Read FILES strictly and report every problem found."""
     from quiltcli.analysis.check import check_files
 
-    problems = check_files(files)
+    problems = check_files(files, lambda notice: click.echo(f"note: {notice}", err=True))
     for problem in problems:
         click.echo(str(problem))
     if problems:

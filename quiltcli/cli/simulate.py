@@ -67,5 +67,10 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
     samples, threads = how.pop("supersample"), how.pop("threads") or 0
     options = PictureOptions(samples=samples, threads=threads, resampled=True, **how)
     loaded = load_job(job, sets)
-    for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures):
+    for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures, _note):
         click.echo(line)
+
+
+def _note(notice: str) -> None:
+    """Say what is good to know, beside the figures."""
+    click.echo(f"note: {notice}", err=True)

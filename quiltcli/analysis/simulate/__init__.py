@@ -7,7 +7,7 @@ viewer's eye the result must be the picture that one would get of the scene with
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,11 +104,15 @@ class Simulation:
 
 
 def simulate(
-    job: JobFile, frames: Sequence[int], options: PictureOptions | None = None
+    job: JobFile,
+    frames: Sequence[int],
+    options: PictureOptions | None = None,
+    say: Callable[[str], None] = lambda notice: None,
 ) -> Iterator[Simulation]:
     """Look at the display with its images on, in some frames of a job.
 
     The images are those a render of the job has left, where there are any, else drawn in memory.
+    What of the scene is not drawn goes to `say`.
 
     Raises:
         QuiltError: bad input, or images that cannot be read.
@@ -117,6 +121,8 @@ def simulate(
     views_of(job, frames)  # what is wrong with the path is said before anything is loaded
     sha = job_sha256(job)
     stage = set_stage(with_channels(job, ("rgba",)))
+    for notice in stage.scene.notices:
+        say(notice)
     threads = options.threads or default_threads()
     views = [view for view in stage.views(frames) if options.eye in ("", view.eye)]
     if not views:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -46,9 +46,15 @@ class Pictures:
 
 
 def write_pictures(
-    job: JobFile, frames: Sequence[int], options: PictureOptions, pictures: Pictures
+    job: JobFile,
+    frames: Sequence[int],
+    options: PictureOptions,
+    pictures: Pictures,
+    say: Callable[[str], None] = lambda notice: None,
 ) -> Iterator[str]:
-    """Take and write pictures; yields what there is to say, line by line.
+    """Take and write pictures; yields what there is to say of them, line by line.
+
+    What of the scene is not drawn goes to `say`.
 
     Raises:
         QuiltError: bad input, or a file that cannot be written.
@@ -60,7 +66,7 @@ def write_pictures(
         raise JobError("--glasses shows two eyes' pictures (expected a job with viewer.stereo, and no --eye)")
     with ExitStack() as ends:
         show = ends.enter_context(film(pictures.video, job.fps)) if pictures.video else None
-        seen = simulate(job, frames, options)
+        seen = simulate(job, frames, options, say)
         for result in through_glasses(seen, pictures.glasses) if pictures.glasses else seen:
             if show and pictures.video:
                 look = Look(pictures.view, pictures.exposure, coding_of(pictures.video).depth)
