@@ -8,8 +8,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
+from quiltcli.formats.gltf.container import files_beside
 from quiltcli.job.dump import plain
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import PackSpec
@@ -62,8 +62,8 @@ def _sha256(path: Path) -> bytes:
 def _drawn_in(path: Path) -> Iterator[Path]:
     """Files that a mesh file names."""
     suffix = path.suffix.lower()
-    if suffix == ".gltf":
-        yield from (path.parent / unquote(uri) for uri in _uris(_json(path)) if not uri.startswith("data:"))
+    if suffix in (".gltf", ".glb"):
+        yield from files_beside(path)
     if suffix == ".obj":
         for name in _named(path, rb"mtllib"):
             yield path.parent / name
@@ -71,24 +71,6 @@ def _drawn_in(path: Path) -> Iterator[Path]:
                 yield from (
                     path.parent / picture for picture in _named(path.parent / name, rb"map_\w+|bump|norm")
                 )
-
-
-def _json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_bytes())
-    except ValueError:
-        return None
-
-
-def _uris(data: Any) -> Iterator[str]:
-    """Every `uri` of a glTF document."""
-    if not isinstance(data, dict):
-        return
-    for kind in ("buffers", "images"):
-        items = data.get(kind)
-        for item in items if isinstance(items, list) else ():
-            if isinstance(item, dict) and isinstance(item.get("uri"), str):
-                yield item["uri"]
 
 
 def _named(path: Path, words: bytes) -> Iterator[str]:

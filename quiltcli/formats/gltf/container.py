@@ -11,6 +11,7 @@ import binascii
 import re
 import stat
 import struct
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote, unquote_to_bytes
@@ -105,6 +106,24 @@ class Container:
             raise uri.error(f"{_short(text)} cannot be read: {error.strerror}") from None
 
 
+def files_beside(path: Path) -> list[Path]:
+    """The files that the buffers and images of a glTF file lie in; none for a file that cannot be read."""
+    try:
+        container = _opened(path)
+    except MeshError:
+        return []
+    entries: list[Json] = []
+    for kind in ("buffers", "images"):
+        with suppress(MeshError):
+            entries += container.json[kind].items()
+    found = []
+    for entry in entries:
+        with suppress(MeshError):
+            if entry["uri"] and not entry["uri"].text().startswith("data:"):
+                found.append(container.beside(entry["uri"]))
+    return found
+
+
 def _embedded(uri: Json, text: str) -> bytes:
     """The bytes of a `data:` URI (RFC 2397)."""
     head = _DATA.match(text)
@@ -131,6 +150,13 @@ def read_container(path: Path) -> Container:
     Raises:
         MeshError: the file cannot be read, is cut off, is not glTF, or not of version 2.
     """
+    container = _opened(path)
+    _check_version(container.json)
+    return container
+
+
+def _opened(path: Path) -> Container:
+    """The parts of a file of any version."""
     data = _file_bytes(path)
     binary = path.suffix.lower() == ".glb"
     if data[:4] == _MAGIC and not binary:
@@ -142,7 +168,6 @@ def read_container(path: Path) -> Container:
         )
     text, chunk = _chunks(path, data) if binary else (data, None)
     json, repeated = parse_json(text, str(path))
-    _check_version(json)
     return Container(path, json, chunk, repeated)
 
 

@@ -93,7 +93,9 @@ class Json:
 
     def has(self, key: str) -> bool:
         """Whether this object has a member, told without a look at what it is."""
-        return isinstance(self.value, dict) and self.value.get(key) is not None
+        if not isinstance(self.value, dict):
+            raise self.expected("an object")
+        return self.value.get(key) is not None
 
     def names(self) -> list[str]:
         """Names of this object's members."""
