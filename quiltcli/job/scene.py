@@ -177,7 +177,11 @@ def _listed_lights(value: Any) -> Any:
     """`lights: file` is short for a list of that one entry."""
     if value == "file":
         return ({"type": "file"},)
-    return tuple(value) if isinstance(value, list) else value
+    if not isinstance(value, (list, tuple)):
+        near = suggest(value, ("file",)) if isinstance(value, str) else ""
+        hint = f" (did you mean {near!r}?)" if near else ""
+        raise complaint(f"expected file or a list of lights, got {describe(value)}{hint}")
+    return tuple(value)
 
 
 class SceneFile(FileModel):

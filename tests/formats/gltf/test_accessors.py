@@ -45,7 +45,9 @@ def test_every_component_type(tmp_path, dtype):
 def test_normalized_integers_span_0_or_minus_1_to_1(tmp_path, dtype, stored, expected):
     file = GltfFile()
     file.accessor(np.reshape(stored, (4, 1)), dtype, normalized=True)
-    np.testing.assert_array_equal(values(file, tmp_path, "SCALAR")[:, 0], np.array(expected, dtype=np.float64))
+    np.testing.assert_array_equal(
+        values(file, tmp_path, "SCALAR")[:, 0], np.array(expected, dtype=np.float64)
+    )
 
 
 def test_a_stride_steps_over_other_numbers(tmp_path):

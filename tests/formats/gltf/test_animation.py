@@ -33,7 +33,14 @@ def test_linear_keys_are_joined_by_lines_and_held_outside(tmp_path):
     file.animation(0, "translation", [1, 2, 4], [(0, 0, 0), (2, 0, 0), (2, 8, 0)])
     path = file.write(tmp_path / "m.glb")
     assert corners(path).min() == 9
-    for time, expected in [(-5, (0, 0)), (1, (0, 0)), (1.25, (0.5, 0)), (2, (2, 0)), (3, (2, 4)), (9, (2, 8))]:
+    for time, expected in [
+        (-5, (0, 0)),
+        (1, (0, 0)),
+        (1.25, (0.5, 0)),
+        (2, (2, 0)),
+        (3, (2, 4)),
+        (9, (2, 8)),
+    ]:
         assert low(path, time)[:2] == list(expected)
 
 

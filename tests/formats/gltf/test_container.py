@@ -1,5 +1,7 @@
 """The outside of a glTF file: chunks, texts, buffers and where they lie."""
 
+# ruff: noqa: E501 - exact messages are easier to read, and to find, unbroken
+
 from __future__ import annotations
 
 import json

@@ -1,5 +1,7 @@
 """Materials, lights and pictures of a file."""
 
+# ruff: noqa: E501 - exact messages are easier to read, and to find, unbroken
+
 from __future__ import annotations
 
 import io
@@ -158,7 +160,9 @@ def bomb(side: int) -> bytes:
 @pytest.mark.parametrize("side", [60_000, 2**31 - 1])
 def test_an_image_bomb_is_refused_by_its_header(tmp_path, side):
     found = textured(tmp_path, data=bomb(side))
-    assert found.startswith("m.glb: images[0]: material 'wood', baseColorTexture: image 0 cannot be read: it ")
+    assert found.startswith(
+        "m.glb: images[0]: material 'wood', baseColorTexture: image 0 cannot be read: it "
+    )
 
 
 def test_images_that_cannot_be_read_are_named_with_their_material(tmp_path):
@@ -207,7 +211,12 @@ def test_a_picture_that_is_ktx2_alone(tmp_path):
 
 
 def test_lights_are_where_their_nodes_are(tmp_path):
-    spot = {"type": "spot", "intensity": 9, "range": 4, "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.2}}
+    spot = {
+        "type": "spot",
+        "intensity": 9,
+        "range": 4,
+        "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.2},
+    }
     sun = {"type": "directional", "color": [1, 0.5, 0], "intensity": 683, "name": "sun"}
     file = GltfFile(extensions={"KHR_lights_punctual": {"lights": [sun, spot, {"type": "point"}]}})
     file.node(mesh=file.mesh())
@@ -215,7 +224,12 @@ def test_lights_are_where_their_nodes_are(tmp_path):
         file.node(extensions={"KHR_lights_punctual": {"light": number}}, translation=[number, 2, 3])
     first, second = read_gltf(file.write(tmp_path / "m.glb")).lights
     assert (first.kind, first.reach, first.inner, first.outer) == ("spot", 4, 0.1, 0.2)
-    assert (second.kind, second.name, second.color, second.intensity) == ("directional", "sun", (1, 0.5, 0), 683)
+    assert (second.kind, second.name, second.color, second.intensity) == (
+        "directional",
+        "sun",
+        (1, 0.5, 0),
+        683,
+    )
     assert second.reach == np.inf
 
 

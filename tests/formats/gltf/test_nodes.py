@@ -1,5 +1,7 @@
 """Nodes: placement, trees and instances."""
 
+# ruff: noqa: E501 - exact messages are easier to read, and to find, unbroken
+
 from __future__ import annotations
 
 import math
@@ -100,7 +102,9 @@ def test_instances_of_the_extension_stand_where_it_says(tmp_path):
         "SCALE": file.accessor([(1, 1, 1), (1, 1, 1), (2, 2, 2)]),
     }
     file.node(
-        mesh=file.mesh(), translation=[0, 5, 0], extensions={"EXT_mesh_gpu_instancing": {"attributes": places}}
+        mesh=file.mesh(),
+        translation=[0, 5, 0],
+        extensions={"EXT_mesh_gpu_instancing": {"attributes": places}},
     )
     found = corners(file.write(tmp_path / "m.glb")).reshape(3, -1, 3)
     assert found.min(axis=1).tolist() == [[0, 5, 0], [9, 4, 0], [20, 5, 0]]
