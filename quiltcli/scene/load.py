@@ -91,6 +91,7 @@ class _Gathered:
             words = f"{clips} of the file not played ('animation' of the object plays them)"
             self.notices.append(f"{name}: {words}")
             return
+        self.notices.append(f"{name}: the animation is not played yet: the object stands as at its start")
         lost = contested_channels(model, playing)
         if lost:
             words = f"animated by two clips at once (the first counts): {_counted(lost, 'channel')}"

@@ -12,11 +12,13 @@ from quiltcli.job import load_scene_file
 from quiltcli.scene import load_scene
 from quiltcli.scene.bake import bake, reposed
 from quiltcli.scene.importers.asset import read_asset
-from quiltcli.scene.importers.gltf import gltf_parts, pose
+from quiltcli.scene.importers.gltf import Playing, gltf_parts, pose
 from quiltcli.scene.importers.part import placed
+from quiltcli.scene.movers import Mover
 from tests.helpers.gltf_files import SQUARE, GltfFile, one_square
 
 HEADLIGHT = ": a headlight at the viewer and a dim ambient light are used"
+STILL = "m: the animation is not played yet: the object stands as at its start"
 SUN = {"type": "directional", "intensity": 683 * 2, "color": [1, 0.5, 0]}
 LAMP = {"type": "point", "intensity": 683 * 5}
 SPOT = {"type": "spot"}
@@ -114,7 +116,9 @@ def test_a_file_of_lines_alone_has_no_triangles(tmp_path):
 
 def test_lights_of_the_file_stand_where_the_object_is(tmp_path):
     file = lit(SUN, LAMP, translation=[0, 1, 0])
-    scene = scene_of(file, tmp_path, ", transform: {rotate_deg: [0, 90, 0], translate: [0, 0, 4]}}\nlights: file\n")
+    scene = scene_of(
+        file, tmp_path, ", transform: {rotate_deg: [0, 90, 0], translate: [0, 0, 4]}}\nlights: file\n"
+    )
     # A sun shines along -Z, which the object turns to -X; lux and candela are 683 times watts.
     assert scene.lights.directional_direction == pytest.approx(np.array([[-1, 0, 0]]), abs=1e-7)
     assert scene.lights.directional_color.tolist() == [[2, 1, 0]]
@@ -167,12 +171,12 @@ def moving():
 def test_an_object_begins_where_its_animation_does(tmp_path, keys, expected):
     scene = scene_of(moving(), tmp_path, f", animation: {keys}}}\nlights: [{{type: ambient}}]\n")
     assert scene.vertices.min(axis=0).tolist() == expected
-    assert scene.notices == ()
+    assert scene.notices == (STILL,)
 
 
 def test_channels_that_two_clips_move_are_told(tmp_path):
     scene = scene_of(moving(), tmp_path, ", animation: {}}\nlights: [{type: ambient}]\n")
-    assert scene.notices == ("m: animated by two clips at once (the first counts): 1 channel",)
+    assert scene.notices == (STILL, "m: animated by two clips at once (the first counts): 1 channel")
 
 
 def test_an_animation_that_is_not_there(tmp_path):
@@ -210,10 +214,25 @@ def test_an_object_posed_anew_is_the_object_baked_in_that_pose(tmp_path, normals
     still = bake(gltf_parts(model, 0.0), mode)
     for time in (0.0, 0.3, 1.0):
         expected = bake(gltf_parts(model, time), mode)
-        vertices, found = reposed(still, *(pose(model, time) if mode == "auto" else (pose(model, time)[0], np.zeros((8, 3)))))
+        vertices, found = reposed(still, *pose(model, time))
         np.testing.assert_array_equal(still.triangles, expected.triangles)
         np.testing.assert_array_equal(vertices, expected.vertices)
         np.testing.assert_allclose(found, expected.normals, atol=1e-6)
+
+
+@pytest.mark.parametrize("matrix", [None, np.diag([-2.0, 2, 2, 1])])
+def test_a_mover_is_the_object_placed_in_the_world(tmp_path, matrix):
+    model = read_asset(bent(normals=False).write(tmp_path / "m.glb")).model
+
+    def world(time):
+        parts = gltf_parts(model, time)
+        return bake(parts if matrix is None else [placed(part, matrix) for part in parts])
+
+    mover = Mover(model, Playing(), matrix, world(0.0))
+    for time in (0.0, 0.5, 2.0):
+        vertices, normals = mover.at(time)
+        np.testing.assert_array_equal(vertices, world(time).vertices)
+        np.testing.assert_allclose(normals, world(time).normals, atol=1e-6)
 
 
 def test_parts_without_normals_beside_parts_with_some(tmp_path):

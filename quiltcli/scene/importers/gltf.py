@@ -162,6 +162,8 @@ def pose(model: GltfModel, seconds: float, playing: Playing | None = None) -> tu
     """
     at = _pose(model, seconds, playing)
     found = [placed(model.gltf, piece, at) for piece in model.pieces]
+    if not found:
+        return np.empty((0, 3)), np.empty((0, 3))
     return (
         np.concatenate([one.vertices for one in found]),
         np.concatenate(

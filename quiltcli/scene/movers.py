@@ -1,0 +1,40 @@
+"""Objects that the animations of their files move, with triangles that stay the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.geometry import Float32Array, FloatArray
+from quiltcli.scene.bake import Baked, reposed
+from quiltcli.scene.importers.gltf import GltfModel, Playing, pose
+from quiltcli.scene.importers.part import Part, placed
+from quiltcli.scene.materials import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Mover:
+    """An object of the scene that moves.
+
+    Attributes:
+        model: its file.
+        playing: which animations are played.
+        matrix: (4, 4) the object's place in the world, or None.
+        baked: the object as it was loaded, in any pose.
+    """
+
+    model: GltfModel
+    playing: Playing
+    matrix: FloatArray | None
+    baked: Baked
+
+    def at(self, seconds: float) -> tuple[FloatArray, Float32Array]:
+        """World vertices (V, 3) and unit normals (V, 3) at a time, in the order of `baked`."""
+        vertices, normals = pose(self.model, seconds, self.playing)
+        if self.matrix is not None:
+            nothing = np.empty((0, 3), dtype=np.int64)
+            moved = placed(Part(vertices, nothing, normals, None, Surface()), self.matrix)
+            vertices = moved.vertices
+            normals = np.zeros_like(vertices) if moved.normals is None else moved.normals
+        return reposed(self.baked, vertices, normals)
