@@ -127,7 +127,8 @@ class Accessors:
 
 def as_floats(raw: AnyArray, *, normalized: bool) -> FloatArray:
     """Stored numbers as float64: f = max(c / greatest, -1) for normalized integers (section 3.6.2.2)."""
-    values = raw.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a NaN that signals becomes one that does not
+        values = raw.astype(np.float64)
     if normalized and raw.dtype.kind in "iu":
         values /= np.iinfo(raw.dtype).max
         np.maximum(values, -1.0, out=values)

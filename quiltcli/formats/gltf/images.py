@@ -7,7 +7,9 @@ that a few kilobytes that promise 60,000 × 60,000 pixels are refused before any
 from __future__ import annotations
 
 import os
+import struct
 import tempfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,6 +25,9 @@ from quiltcli.formats.gltf.json_values import Json
 
 MOST_PIXELS = 2**28
 MOST_SIDE = 2**16
+_PNG = b"\x89PNG\r\n\x1a\n"
+# After its last scan a JPEG says that it ends; its reader makes up what is missing, grey and silent.
+_JPEG, _SCAN_OF_JPEG, _END_OF_JPEG = b"\xff\xd8\xff", b"\xff\xda", b"\xff\xd9"
 _KTX2 = b"\xabKTX 20\xbb"
 
 
@@ -92,6 +97,9 @@ def _opened(images: Images, index: int, use: str) -> Iterator[Any]:
     data = images.data(index)
     if data.startswith(_KTX2):
         raise _unreadable(images, index, use, "it is KTX2, which is not read (export it as PNG or JPEG)")
+    cut_off = data.startswith(_JPEG) and data.rfind(_END_OF_JPEG) < data.rfind(_SCAN_OF_JPEG)
+    if cut_off or (data.startswith(_PNG) and not _whole_png(data)):
+        raise _unreadable(images, index, use, "it is damaged or cut off")
     config = oiio.ImageSpec()
     config["oiio:UnassociatedAlpha"] = 1
     with _as_file(data) as name:
@@ -109,6 +117,20 @@ def _opened(images: Images, index: int, use: str) -> Iterator[Any]:
                 picture.close()
         finally:
             oiio.attribute("limits:imagesize_MB", before)
+
+
+def _whole_png(data: bytes) -> bool:
+    """Whether the chunks of a PNG are whole; the library that reads it would print what is wrong."""
+    at, kind = len(_PNG), b""
+    while kind != b"IEND" and at + 12 <= len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        if at + 12 + size > len(data) or (at == len(_PNG) and (kind, size) != (b"IHDR", 13)):
+            return False
+        (check,) = struct.unpack_from(">I", data, at + 8 + size)
+        if zlib.crc32(memoryview(data)[at + 4 : at + 8 + size]) != check:
+            return False
+        at += 12 + size
+    return kind == b"IEND"
 
 
 def _check_size(images: Images, index: int, use: str, spec: Any) -> None:

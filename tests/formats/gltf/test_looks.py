@@ -177,10 +177,30 @@ def test_images_that_cannot_be_read_are_named_with_their_material(tmp_path):
     assert textured(tmp_path, uri="gone.png") == "m.glb: images[0].uri: 'gone.png' is missing beside it"
 
 
+@pytest.mark.parametrize("change", ["cut", "head", "middle"])
+def test_a_damaged_png_is_found_before_it_is_read_and_nothing_is_printed(tmp_path, capfd, change):
+    data = bytearray(png((1, 2, 3, 4), (64, 64)))
+    if change == "cut":
+        del data[-30:]
+    else:
+        data[18 if change == "head" else len(data) // 2] ^= 1
+    words = "image 0 cannot be read: it is damaged or cut off"
+    assert textured(tmp_path, data=bytes(data)).endswith(words)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_jpeg_cut_off_is_no_half_grey_picture(tmp_path):
+    from PIL import Image
+
+    whole = io.BytesIO()
+    Image.effect_noise((64, 64), 90).save(whole, "JPEG")
+    data = whole.getvalue()
+    assert "it is damaged or cut off" in textured(tmp_path, data=data[: len(data) // 2])
+
+
 def test_a_picture_cut_off_is_found_when_it_is_read(tmp_path):
     file = GltfFile()
-    data = png((1, 2, 3, 4), (64, 64))
-    file.add("images", bufferView=file.view(data[:-30]))
+    file.add("images", bufferView=file.view(b"P6 64 64 255\n" + bytes(100)))
     file.add("textures", source=0)
     file.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0}})
     file.node(mesh=file.mesh(file.primitive(material=0)))
