@@ -179,7 +179,7 @@ class Json:
     def numbers(self, count: int, default: Sequence[float] | None = None) -> tuple[float, ...]:
         """A list of `count` finite numbers."""
         if self.value is None and default is not None:
-            return tuple(default)
+            return tuple(map(float, default))
         if not isinstance(self.value, list) or len(self.value) != count:
             raise self.expected(f"a list of {count} numbers")
         return tuple(item.number() for item in self.items())
