@@ -16,9 +16,12 @@ def check(files: tuple[Path, ...]) -> None:
     """Read FILES strictly and report every problem found."""
     from quiltcli.analysis.check import check_files
 
-    problems = check_files(files, lambda notice: click.echo(f"note: {notice}", err=True))
+    notices: list[str] = []
+    problems = check_files(files, notices.append)
     for problem in problems:
         click.echo(str(problem))
     if problems:
         sys.exit(1)
+    for notice in notices:
+        click.echo(f"note: {notice}", err=True)
     click.echo(f"{len(files)} file{'s' * (len(files) > 1)}: nothing is wrong", err=True)

@@ -190,7 +190,7 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, memoryview | None]:
     """The JSON text and the binary chunk of a GLB; chunks of other kinds are passed over."""
     damaged = "cannot be read as GLB: the file is damaged or incomplete"
     if len(data) < 20:
-        raise _error(path, f"{damaged} ({len(data)} bytes)")
+        raise _error(path, damaged)
     version, total = struct.unpack_from("<II", data, 4)
     if version != 2:
         raise _error(path, f"is glTF {version} (only glTF 2 is read)")
