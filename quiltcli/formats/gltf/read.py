@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from quiltcli.formats.gltf import lights, materials
 from quiltcli.formats.gltf.accessors import Accessors
 from quiltcli.formats.gltf.animation import read_clips
 from quiltcli.formats.gltf.compression import DRACO, MESHOPT
 from quiltcli.formats.gltf.container import Container, read_container
 from quiltcli.formats.gltf.images import Images
 from quiltcli.formats.gltf.json_values import Json
+from quiltcli.formats.gltf.lights import LIGHTS, read_lights
+from quiltcli.formats.gltf.materials import BASISU, STRENGTH, TRANSFORM, UNLIT, WEBP, read_material
 from quiltcli.formats.gltf.model import Gltf, Material, Primitive, Shape, Skin
 from quiltcli.formats.gltf.nodes import INSTANCING, instances, read_nodes
 from quiltcli.formats.gltf.primitives import TRIANGLES, mode_of, read_primitive, triangle_count
@@ -23,8 +24,8 @@ MOST_TRIANGLES = 2**26
 MOST_PIECES = 2**20
 _QUANTIZATION = "KHR_mesh_quantization"
 READ = (
-    *(DRACO, MESHOPT, INSTANCING, _QUANTIZATION, lights.LIGHTS),
-    *(materials.UNLIT, materials.STRENGTH, materials.TRANSFORM, materials.WEBP),
+    *(DRACO, MESHOPT, INSTANCING, _QUANTIZATION, LIGHTS),
+    *(UNLIT, STRENGTH, TRANSFORM, WEBP),
 )
 # These are spoken of where they stand, or say nothing that is to be seen.
 _SPOKEN_OF = ("KHR_animation_pointer", "KHR_xmp_json_ld", "KHR_xmp")
@@ -70,7 +71,7 @@ class _Reader:
         self._check_size(showing)
         shapes = tuple(self._shape(node, len(nodes.parent)) for node in showing)
         clips, other_channels = read_clips(self.json, self.accessors)
-        found_lights = lights.read_lights(self.json, drawn)
+        found_lights = read_lights(self.json, drawn)
         cameras = sum(entries.at(node).has("camera") for node in drawn)
         return Gltf(
             path=self.container.path,
@@ -90,7 +91,7 @@ class _Reader:
         """Stop at what the file cannot be understood without."""
         for item in self.json["extensionsRequired"].items():
             name = item.text()
-            if name == materials.BASISU:
+            if name == BASISU:
                 raise item.error(f"needs {name}: KTX2 images are not read (export them as PNG or JPEG)")
             if name not in READ:
                 raise item.error(f"needs {name[:60]}, which is not read")
@@ -173,7 +174,7 @@ class _Reader:
     def _material(self, index: int) -> Material:
         if index < 0:
             return Material()
-        return materials.read_material(self.json, self.json["materials"].at(index))
+        return read_material(self.json, self.json["materials"].at(index))
 
     def _notices(self, cameras: int, other_channels: int) -> Iterator[str]:
         """What the file holds and nothing is made of."""
