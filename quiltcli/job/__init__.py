@@ -17,6 +17,7 @@ from quiltcli.job.load import (
     load_layout_file,
     load_scene_file,
 )
+from quiltcli.job.recorded import FilterSpec, GapsSpec, MarkerSpec, RecordedSpec
 from quiltcli.job.scene import (
     AmbientLight,
     DirectionalLight,
@@ -29,6 +30,10 @@ from quiltcli.job.scene import (
 from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, ViewerSpec
 
 __all__ = [
+    "RecordedSpec",
+    "MarkerSpec",
+    "GapsSpec",
+    "FilterSpec",
     "COMPRESSIONS",
     "PACKING_METHODS",
     "UNITS",
