@@ -30,10 +30,6 @@ from quiltcli.job.scene import (
 from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, ViewerSpec
 
 __all__ = [
-    "RecordedSpec",
-    "MarkerSpec",
-    "GapsSpec",
-    "FilterSpec",
     "COMPRESSIONS",
     "PACKING_METHODS",
     "UNITS",
@@ -42,10 +38,13 @@ __all__ = [
     "DirectionalLight",
     "DisplayFile",
     "FacetSpec",
+    "FilterSpec",
+    "GapsSpec",
     "JobFile",
     "KeyframeSpec",
     "LayoutFile",
     "LightSpec",
+    "MarkerSpec",
     "MaterialSpec",
     "ObjectSpec",
     "OrbitSpec",
@@ -55,6 +54,7 @@ __all__ = [
     "PathSpec",
     "PlaceSpec",
     "PointLight",
+    "RecordedSpec",
     "RenderSpec",
     "ResolutionSpec",
     "SceneFile",

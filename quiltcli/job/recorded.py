@@ -175,7 +175,7 @@ class RecordedSpec(Model):
 
     @property
     def axis_map(self) -> FloatArray | None:
-        """Rows (3, 3) that make x right, y up, z back of the file's axes, as stated; None where they are not."""
+        """Rows (3, 3) that make x right, y up, z back of the file's axes; None where they are not stated."""
         names = self.axes or {"y": ("x", "y", "z"), "z": ("x", "z", "-y")}.get(self.up_axis or "")
         if names is None:
             return None
@@ -196,4 +196,7 @@ class RecordedSpec(Model):
             if size <= 0:
                 yield ("world_from_tracker",), "mirrors the take (its determinant is negative)"
             elif np.abs(turn.T @ turn / size**2 - np.eye(3)).max() > 1e-6:
-                yield ("world_from_tracker",), "bends the take (expected one scale for all axes, and no shear)"
+                yield (
+                    ("world_from_tracker",),
+                    "bends the take (expected one scale for all axes, and no shear)",
+                )

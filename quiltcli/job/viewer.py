@@ -16,6 +16,7 @@ from quiltcli.job.model import (
     Complaint,
     Direction,
     ExistingFile,
+    Items,
     Listed,
     Model,
     Number,
@@ -26,6 +27,7 @@ from quiltcli.job.model import (
     describe,
     exactly_one,
 )
+from quiltcli.job.recorded import RecordedSpec
 
 Vector = tuple[float, float, float]
 
@@ -68,6 +70,16 @@ def parallel(a: Vector, b: Vector) -> bool:
     return across <= 1e-6 * math.hypot(*a) * math.hypot(*b)
 
 
+Quaternion = tuple[Number, Number, Number, Number]
+AIMS = ("look_at", "look", "orientation")
+
+
+def _turning(value: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    if math.hypot(*value) < 1e-6:
+        raise complaint("must not be 0 (expected a quaternion x, y, z, w)")
+    return value
+
+
 class KeyframeSpec(Model):
     """The pose at one frame."""
 
@@ -79,12 +91,22 @@ class KeyframeSpec(Model):
     """Point that is looked at, metres."""
     look: Direction | None = None
     """Direction of view, instead of `look_at`."""
+    orientation: Annotated[Quaternion, Items(4), AfterValidator(_turning)] | None = None
+    """How the head is turned, instead of an aim: quaternion x, y, z, w; unturned it looks along −Z, +Y up."""
     up: Direction = (0.0, 1.0, 0.0)
     """Direction that is up in the view."""
 
+    @property
+    def aim(self) -> str:
+        """The key that says where the viewer looks; empty where none does."""
+        return next((name for name in AIMS if getattr(self, name) is not None), "")
+
     def cross_checks(self) -> Iterator[Complaint]:
-        """One aim, and a possible one."""
-        yield from exactly_one(self, "look_at", "look")
+        """One aim at most, and a possible one."""
+        if sum(getattr(self, name) is not None for name in AIMS) > 1:
+            yield from exactly_one(self, *AIMS)
+        if self.orientation is not None and "up" in self.model_fields_set:
+            yield ("up",), "cannot stand beside orientation, which says what is up"
         yield from pose_complaints(self.position, self.look_at, self.look, self.up)
 
 
@@ -136,7 +158,8 @@ class CsvSpec(Model):
     """A recorded path: one row a frame."""
 
     file: Annotated[Path, ExistingFile((".csv", ".txt"), "a CSV file")]
-    """CSV file with frame, x, y, z, and if it has them look_at_x … or look_x …, and up_x …."""
+    """CSV file with frame, x, y, z, and if it has them look_at_x … or look_x …, and up_x …; or qx, qy, qz, qw
+    or yaw_deg, pitch_deg, roll_deg."""
     units: Units = "m"
     """What positions are measured in."""
     fill: bool = False
@@ -173,7 +196,9 @@ class PathSpec(Model):
     orbit: OrbitSpec | None = None
     """A circle."""
     csv: Annotated[CsvSpec, BeforeValidator(_csv)] | None = None
-    """A recorded path: a file name, or a mapping with `file`."""
+    """A recorded path of one row a frame: a file name, or a mapping with `file`."""
+    recorded: Annotated[RecordedSpec, BeforeValidator(_csv)] | None = None
+    """A take of a tracker or a camera: a file name, or a mapping with `file`."""
 
     @model_validator(mode="before")
     @classmethod
@@ -185,7 +210,7 @@ class PathSpec(Model):
 
     def cross_checks(self) -> Iterator[Complaint]:
         """One kind, keyframes apart in time, all aimed the same way."""
-        yield from exactly_one(self, "keyframes", "orbit", "csv")
+        yield from exactly_one(self, "keyframes", "orbit", "csv", "recorded")
         if self.keyframes is None:
             if self.interpolation is not None:
                 yield ("interpolation",), "belongs to keyframes, and there are none"
@@ -196,9 +221,13 @@ class PathSpec(Model):
                 words = f"frame {key.frame} is already given by keyframes[{first[key.frame]}]"
                 yield ("keyframes", i, "frame"), words
             first.setdefault(key.frame, i)
-            if (key.look is None) != (self.keyframes[0].look is None):
+            if key.aim != self.keyframes[0].aim:
                 words = "keyframes[0] aims the other way (use look_at in all keyframes, or look in all)"
-                yield ("keyframes", i, "look_at" if key.look is None else "look"), words
+                if "orientation" in (key.aim, self.keyframes[0].aim):
+                    words = "keyframes[0] aims otherwise (use orientation in all keyframes, or in none)"
+                elif not (key.aim and self.keyframes[0].aim):
+                    words = "keyframes[0] aims otherwise (aim all keyframes, or none)"
+                yield ("keyframes", i, key.aim or "position"), words
 
 
 class StereoSpec(Model):

@@ -8,6 +8,7 @@ from quiltcli.display import pitch_mm
 from quiltcli.geometry import BoolArray
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words
+from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 
 
@@ -35,4 +36,10 @@ def stage_warnings(stage: Stage) -> Iterator[str]:
         yield (
             f"the bleed of {stage.job.render.bleed} pixels is wider than the layout's padding of"
             f" {stage.layout.padding}: neighbours share what lies between them"
+        )
+    viewers = viewers_of(stage.job, stage.job.frames[:1])
+    if stage.job.render.depth == "planar" and not all(viewer.aimed for viewer in viewers):
+        yield (
+            "the path does not say where the head looks, on which no picture for one eye depends; depth is"
+            " measured along the line to the display's middle (render.depth: radial measures the distance)"
         )

@@ -14,21 +14,35 @@ import numpy as np
 from quiltcli.errors import ViewerError
 from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import FloatArray, normalized
-from quiltcli.job import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec
-from quiltcli.viewer.recorded import Track, read_track
+from quiltcli.job import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, RecordedSpec
+from quiltcli.viewer.interpolation import hold, linear, smooth
+from quiltcli.viewer.recorded import quaternions
+from quiltcli.viewer.recorded.head import pose_of, read_head
+from quiltcli.viewer.recorded.resample import arc
+from quiltcli.viewer.recorded.rows import Track, read_track
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Eye (3,), metres; direction of view and up (3,), neither unit nor orthogonal yet; key to blame."""
+    """Eye (3,), metres; direction of view and up (3,), neither unit nor orthogonal yet; key to blame.
+
+    A path that says nothing of a direction has none for `look`; then its words are in `unaimed`.
+    """
 
     eye: FloatArray
-    look: FloatArray
+    look: FloatArray | None
     up: FloatArray
     blame: tuple[str | int, ...]
+    unaimed: str = ""
 
 
-def keyframe_pose(path: PathSpec, frame: float) -> Pose:
+def _turned(eye: FloatArray, rotation: FloatArray, blame: tuple[str | int, ...]) -> Pose:
+    """Pose of a head that is turned so: unturned it looks along −Z, with +Y up."""
+    look, up = quaternions.rotated(rotation, np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]))
+    return Pose(eye, look, up, blame)
+
+
+def keyframe_pose(path: PathSpec, frame: float, fps: float) -> Pose:
     """Pose between keyframes; before the first and after the last the ends are held."""
     numbered = sorted(enumerate(path.keyframes or ()), key=lambda item: item[1].frame)
     frames = np.array([key.frame for _, key in numbered], dtype=np.float64)
@@ -46,46 +60,7 @@ def _aim(key: KeyframeSpec) -> FloatArray:
     """Point looked at, or the unit direction of view."""
     if key.look is not None:
         return normalized(np.asarray(key.look))
-    return np.asarray(key.look_at, dtype=np.float64)
-
-
-def hold(x: FloatArray, y: FloatArray, at: float) -> FloatArray:
-    """Value (C,) of the last sample y (K, C) at or before `at`, samples standing at x (K,) ascending."""
-    last = int(np.searchsorted(x, at, side="right")) - 1
-    result: FloatArray = y[max(last, 0)]
-    return result
-
-
-def linear(x: FloatArray, y: FloatArray, at: float) -> FloatArray:
-    """Straight line (C,) between the samples y (K, C) at x (K,), the ends held."""
-    return np.array([np.interp(at, x, column) for column in y.T])
-
-
-def smooth(x: FloatArray, y: FloatArray, at: float) -> FloatArray:
-    """Cubic Hermite curve (C,) through the samples y (K, C) at x (K,), the ends held.
-
-    Tangents are those of the parabola through each sample and its two neighbours (parabolic
-    blending, A. W. Overhauser 1968; on even samples the Catmull-Rom spline). The curve is C1, and
-    exact where the samples lie on a parabola.
-    """
-    if not x[0] < at < x[-1] or x.size < 3:
-        return linear(x, y, at)
-    i = int(np.searchsorted(x, at, side="right")) - 1
-    h = x[i + 1] - x[i]
-    t = (at - x[i]) / h
-    m0, m1 = _tangent(x, y, i) * h, _tangent(x, y, i + 1) * h
-    a, b = (1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t)
-    result: FloatArray = a * y[i] + b * y[i + 1] + t * (1 - t) ** 2 * m0 - t * t * (1 - t) * m1
-    return result
-
-
-def _tangent(x: FloatArray, y: FloatArray, i: int) -> FloatArray:
-    """Slope (C,) at sample i of the parabola through it and its neighbours, or the three at the end."""
-    j = min(max(i, 1), x.size - 2)
-    h0, h1 = x[j] - x[j - 1], x[j + 1] - x[j]
-    s0, s1 = (y[j] - y[j - 1]) / h0, (y[j + 1] - y[j]) / h1
-    result: FloatArray = s0 + (s1 - s0) * (h0 + 2 * (x[i] - x[j])) / (h0 + h1)
-    return result
+    return np.asarray(key.look_at or key.position, dtype=np.float64)
 
 
 INTERPOLATIONS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
@@ -95,7 +70,7 @@ INTERPOLATIONS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]]
 }
 
 
-def orbit_pose(path: PathSpec, frame: float) -> Pose:
+def orbit_pose(path: PathSpec, frame: float, fps: float) -> Pose:
     """Pose on a circle: 0° is on the +Z side of the centre, 90° on the +X side."""
     orbit = path.orbit
     assert orbit is not None
@@ -122,7 +97,7 @@ def _orbit_degrees(orbit: OrbitSpec, frame: float) -> float:
     return orbit.start_deg + (orbit.end_deg - orbit.start_deg) * share
 
 
-def csv_pose(path: PathSpec, frame: float) -> Pose:
+def csv_pose(path: PathSpec, frame: float, fps: float) -> Pose:
     """Pose of a recorded frame; a frame that was not recorded is an error, unless gaps may be filled."""
     spec = path.csv
     assert spec is not None
@@ -130,24 +105,24 @@ def csv_pose(path: PathSpec, frame: float) -> Pose:
     blame = path.source.at("csv")
     row = _track_row(spec, track, frame, blame)
     eye = row[0:3] * spec.metres
-    if track.aim == "look_at":
-        look = row[3:6] * spec.metres - eye
-    elif track.aim == "look":
-        look = row[3:6]
-    else:
-        look = _given_aim(spec, eye, blame)
+    if track.rotations is not None:
+        return _turned(eye, arc(track.frames.astype(np.float64), track.rotations, frame), ("csv",))
     up = row[-3:] if track.has_up else np.asarray(spec.up, dtype=np.float64)
-    return Pose(eye, look, up, ("csv",))
+    if track.aim == "look_at":
+        return Pose(eye, row[3:6] * spec.metres - eye, up, ("csv",))
+    if track.aim == "look":
+        return Pose(eye, row[3:6], up, ("csv",))
+    return _given_aim(spec, eye, up, ("csv",))
 
 
-def _given_aim(spec: CsvSpec, eye: FloatArray, blame: Source) -> FloatArray:
-    """Direction of view from the job, for files that hold positions only."""
+def _given_aim(spec: CsvSpec | RecordedSpec, eye: FloatArray, up: FloatArray, blame: tuple[str]) -> Pose:
+    """Pose with the direction of view from the job, for files that hold positions only."""
     if spec.look is not None:
-        return np.asarray(spec.look, dtype=np.float64)
-    if spec.look_at is None:
-        words = f"{spec.file} holds positions only (add look_at, a point, or look, a direction)"
-        raise ViewerError(blame.problem((), words))
-    return np.asarray(spec.look_at, dtype=np.float64) - eye
+        return Pose(eye, np.asarray(spec.look, dtype=np.float64), up, blame)
+    if spec.look_at is not None:
+        return Pose(eye, np.asarray(spec.look_at, dtype=np.float64) - eye, up, blame)
+    words = f"{spec.file} holds positions only (add look_at, a point, or look, a direction)"
+    return Pose(eye, None, up, blame, words)
 
 
 def _track_row(spec: CsvSpec, track: Track, frame: float, blame: Source) -> FloatArray:
@@ -167,8 +142,21 @@ def _track_row(spec: CsvSpec, track: Track, frame: float, blame: Source) -> Floa
     return linear(track.frames.astype(np.float64), track.values, float(frame))
 
 
-PATHS: dict[str, Callable[[PathSpec, float], Pose]] = {
+def recorded_pose(path: PathSpec, frame: float, fps: float) -> Pose:
+    """Pose of a take at the second that a frame shows."""
+    spec = path.recorded
+    assert spec is not None
+    head = read_head(spec)
+    seconds = spec.start + (frame - spec.start_frame) / fps
+    eye, rotation = pose_of(head, spec, seconds, fps)
+    if rotation is None or spec.look is not None or spec.look_at is not None:
+        return _given_aim(spec, eye, np.asarray(spec.up, dtype=np.float64), ("recorded",))
+    return _turned(eye, rotation, ("recorded",))
+
+
+PATHS: dict[str, Callable[[PathSpec, float, float], Pose]] = {
     "keyframes": keyframe_pose,
     "orbit": orbit_pose,
     "csv": csv_pose,
+    "recorded": recorded_pose,
 }

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
 
+import numpy as np
+
+from quiltcli.display import load_display
 from quiltcli.errors import Problem, QuiltError, ViewerError, raise_all
-from quiltcli.job import JobFile, ViewerSpec
+from quiltcli.geometry import FloatArray
+from quiltcli.job import JobFile, ViewerSpec, load_display_file
 from quiltcli.viewer.viewer import Viewer, viewer_at
 
 EYES = ("left", "right")
@@ -81,7 +87,9 @@ def views_at(job: JobFile, frame: int, clip: str | None = None) -> tuple[View, .
 def _head(job: JobFile, name: str, time: float, clip: str | None) -> Viewer:
     """One viewer at a time in frames, with one eye at the head's place."""
     spec = job.people[name]
-    head = viewer_at(spec, time, job.render.depth)
+    # Where each eye is depends on how the head is turned; what one eye sees does not.
+    middle = None if spec.stereo else partial(_middle_of, job)
+    head = viewer_at(spec, time, job.render.depth, float(job.fps), middle)
     return replace(head, clip=clip, name=name, facets=spec.facets)
 
 
@@ -93,6 +101,18 @@ def _one_eye(job: JobFile, name: str, frame: int, eye: str, clip: str | None) ->
     right = head.camera_from_world[0]
     side = spec.stereo.separation / 2 * (1 if eye == "right" else -1)
     return replace(head, frame=frame, eye=head.eye + side * right, head=head.eye)
+
+
+def _middle_of(job: JobFile) -> FloatArray:
+    """The middle (3,) of the box around the job's display, world metres."""
+    return display_middle(job.display, job.display.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=8)
+def display_middle(path: Path, changed: int) -> FloatArray:
+    """The middle (3,) of the box around a display, world metres."""
+    corners = load_display(load_display_file(path)).corners
+    return np.asarray((corners.min(axis=0) + corners.max(axis=0)) / 2)
 
 
 def _eye_time(spec: ViewerSpec) -> str:

@@ -5,6 +5,7 @@ A pose is a pure function of the frame number, so any chunk of a sequence can be
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,7 @@ class Viewer:
         head: (3,) place between the eyes, world metres; None where there is one eye, at the head's place.
         name: of whoever looks, empty where there is nobody else.
         facets: ids of the only facets that are theirs; None for all.
+        aimed: whether the path says how the head is turned; otherwise `look` goes to the display's middle.
     """
 
     frame: int
@@ -45,6 +47,7 @@ class Viewer:
     head: FloatArray | None = None
     name: str = ""
     facets: tuple[int, ...] | None = None
+    aimed: bool = True
 
     @property
     def camera_from_world(self) -> FloatArray:
@@ -78,19 +81,29 @@ class Viewer:
         return np.asarray(x * self.look[0] + y * self.look[1] + z * self.look[2])
 
 
-def viewer_at(spec: ViewerSpec, frame: float, depth: str) -> Viewer:
+def viewer_at(
+    spec: ViewerSpec, frame: float, depth: str, fps: float, middle: Callable[[], FloatArray] | None = None
+) -> Viewer:
     """The viewer of one frame, or at a time between two.
 
     Args:
         spec: the job's `viewer`.
         frame: frame number, or a time in frames; nothing else enters the pose.
         depth: the job's `render.depth`.
+        fps: frames a second, the clock of takes.
+        middle: the display's middle (3,), asked for where the path says nothing of a direction: a picture
+            for one eye does not depend on where the head looks. None where a direction is needed.
 
     Raises:
         ViewerError: the path gives no usable pose at this frame.
     """
-    pose = _pose(spec.path, frame)
+    pose = _pose(spec.path, frame, fps)
     blame = spec.path.source.at(*pose.blame)
+    if pose.look is None:
+        if middle is None:
+            raise ViewerError(blame.problem((), pose.unaimed))
+        look, up = towards(pose.eye, middle())
+        return Viewer(int(frame), pose.eye, look, up, spec.near, spec.far, depth, aimed=False)
     distance = float(np.linalg.norm(pose.look))
     if not distance > 1e-9:
         why = (
@@ -111,9 +124,20 @@ def viewer_at(spec: ViewerSpec, frame: float, depth: str) -> Viewer:
     return Viewer(int(frame), pose.eye, look, up, spec.near, spec.far, depth)
 
 
-def _pose(path: PathSpec, frame: float) -> Pose:
+def towards(eye: FloatArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Direction of view (3,) from an eye to a point and up (3,), whatever the two: −Z where they are one."""
+    way = point - eye
+    look = normalized(way) if float(np.linalg.norm(way)) > 1e-6 else np.array([0.0, 0.0, -1.0])
+    # Who looks straight up or down has the world's −Z or +Z above.
+    steep = abs(float(look[1])) > 1 - 1e-9
+    up = np.array([0.0, 0.0, np.sign(look[1])]) if steep else np.array([0.0, 1.0, 0.0])
+    right = normalized(cross(look, up))
+    return look, normalized(cross(right, look))
+
+
+def _pose(path: PathSpec, frame: float, fps: float) -> Pose:
     """Pose by the kind of path that was given."""
     for kind, pose_of in PATHS.items():
         if getattr(path, kind) is not None:
-            return pose_of(path, frame)
+            return pose_of(path, frame, fps)
     raise ViewerError(path.source.problem((), f"expected one of {', '.join(PATHS)}"))

@@ -96,7 +96,7 @@ def test_good_file_has_no_problem(kind: str, tmp_path: Path) -> None:
         ("viewer.path.keyframes.7.frame=2",
          "viewer.path.keyframes: there is no item 7 (the list has 1 item, from 0)"),
         ("viewer.path.csv=track.csw", "viewer.path.csv: cannot stand beside keyframes "
-         "(expected only one of keyframes, orbit or csv)"),
+         "(expected only one of keyframes, orbit, csv or recorded)"),
         ("frames=1:4", "frames: ':' means different things to different farms, in '1:4' "
          "(write the step with x: 1-9x2)"),
         ("scene=nothere.obj", "scene: no such file: nothere.obj"),

@@ -150,7 +150,7 @@ CASES = [
     Case("path: duplicate", [swap(JOB, "frame: 4", "frame: 1")], [],
          "job.yaml:11:15: viewer.path.keyframes[1].frame: frame 1 is already given by keyframes[0]"),
     Case("path: two kinds", [swap(JOB, "    keyframes:", "    orbit: {center: [0, 0, 0], radius: 2, frames_per_turn: 4}\n    keyframes:")], [],
-         "job.yaml:9:12: viewer.path.orbit: cannot stand beside keyframes (expected only one of keyframes, orbit or csv)"),
+         "job.yaml:9:12: viewer.path.orbit: cannot stand beside keyframes (expected only one of keyframes, orbit, csv or recorded)"),
     Case("path: near far", [swap(JOB, "near: 0.05", "near: 50")], [],
          "job.yaml:7:8: viewer.far: must be greater than near (50), got 50"),
     Case("path: near 0", [swap(JOB, "near: 0.05", "near: 0")], [],

@@ -49,7 +49,7 @@ def drawn(folder: Path, mesh: str, density: int, scene: str, eye: list[float], a
     (folder / "job.yaml").write_text(JOB.format(scene=ROOT / "scenes" / scene, eye=eye, at=at))
     stage = set_stage(load_job(folder / "job.yaml"))
     buffers = new_buffers(stage)
-    draw_frame(stage, viewer_at(stage.job.viewer, 1, "radial"), buffers)
+    draw_frame(stage, viewer_at(stage.job.viewer, 1, "radial", 30.0), buffers)
     rgb = np.stack([page_of(buffers[name], stage.layout, 0).astype(np.float32) for name in "RGB"], axis=-1)
     return tone_map(rgb, "srgb")
 

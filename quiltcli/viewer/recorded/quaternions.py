@@ -17,7 +17,7 @@ _TINY = 1e-12
 def unit(q: FloatArray) -> FloatArray:
     """Quaternions (..., 4) of length 1; not a number where the length is nothing."""
     length = np.sqrt((q * q).sum(axis=-1, keepdims=True))
-    return np.divide(q, length, out=np.full_like(q, np.nan), where=length > _TINY)
+    return np.asarray(np.divide(q, length, out=np.full_like(q, np.nan), where=length > _TINY))
 
 
 def product(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -30,7 +30,7 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def inverse(q: FloatArray) -> FloatArray:
     """The rotations (..., 4) that undo unit quaternions."""
-    return q * np.array([-1.0, -1.0, -1.0, 1.0])
+    return np.asarray(q * np.array([-1.0, -1.0, -1.0, 1.0]))
 
 
 def rotated(q: FloatArray, v: FloatArray) -> FloatArray:

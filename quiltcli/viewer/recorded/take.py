@@ -33,6 +33,8 @@ class Recording:
         is_camera: whether the rotations' own axes are a camera's, y up and looking along −z, whatever
             the axes of the file; otherwise they are like those of the file.
         rate: samples a second as the file states it.
+        is_curve: whether the samples are the knots of a curve that somebody made, straight between them,
+            and not what an instrument saw: it has neither gaps nor jumps, and its ends are held.
         notices: what of the file was left out, or should be known.
     """
 
@@ -47,6 +49,7 @@ class Recording:
     axes: FloatArray | None = None
     is_camera: bool = False
     rate: float | None = None
+    is_curve: bool = False
     notices: tuple[str, ...] = ()
 
 
@@ -62,6 +65,7 @@ class Take:
         subject: whose samples they are.
         path: the file.
         lines: (N,) 1-based lines of the samples, or None.
+        is_curve: as for a recording.
         notices: what should be known of it.
     """
 
@@ -72,6 +76,7 @@ class Take:
     subject: str
     path: Path
     lines: IntArray | None = field(default=None, repr=False)
+    is_curve: bool = False
     notices: tuple[str, ...] = ()
 
     def problem(self, row: int, words: str) -> Problem:
@@ -101,13 +106,21 @@ def settle(recording: Recording, spec: RecordedSpec) -> Take:
         times = np.arange(len(recording.positions)) / rate if count is None else (count - 1) / rate
     positions = recording.positions @ axes.T * metres
     rotations = _turned(recording, axes)
-    lost = ~np.isfinite(positions).all(axis=1)
+    lost = np.logical_not(np.isfinite(positions).all(axis=1))
     if rotations is not None:
-        lost |= ~np.isfinite(rotations).all(axis=1)
+        lost = np.asarray(lost | ~np.isfinite(rotations).all(axis=1))
         rotations[lost] = np.nan
     positions[lost] = np.nan
     return Take(
-        times, positions, rotations, lost, recording.subject, spec.file, recording.lines, recording.notices
+        times=times,
+        positions=positions,
+        rotations=rotations,
+        lost=lost,
+        subject=recording.subject,
+        path=spec.file,
+        lines=recording.lines,
+        is_curve=recording.is_curve,
+        notices=recording.notices,
     )
 
 

@@ -35,7 +35,11 @@ FORMATS: dict[str, Callable[[RecordedSpec], Recording]] = {
     "usd": read_usd,
 }
 _BY_SUFFIX = {
-    **{".trc": "trc", ".hfcs": "hfcs", ".bren": "arkit", ".json": "arkit", ".tum": "tum"},
+    ".trc": "trc",
+    ".hfcs": "hfcs",
+    ".bren": "arkit",
+    ".json": "arkit",
+    ".tum": "tum",
     **dict.fromkeys((".freed", ".d1", ".pcap"), "freed"),
     **dict.fromkeys((".gltf", ".glb"), "gltf"),
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), "usd"),

@@ -7,6 +7,7 @@ in which order three angles turn; the second does not even name its columns.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,7 +23,7 @@ _BLANKS = Dialect("")
 
 
 def read_chan(spec: RecordedSpec) -> Recording:
-    """Samples of a `.chan` file whose first column is the frame, as Nuke writes it; the camera looks along −z.
+    """Samples of a `.chan` file whose first column is the frame, as Nuke writes it; cameras look along −z.
 
     Raises:
         ViewerError: a line has neither seven nor eight numbers.
@@ -84,7 +85,7 @@ def has_frames(lines: Sequence[str]) -> bool:
         numbers = [int(words[0]) for words in first]
     except ValueError:
         return False
-    return all(b == a + 1 for a, b in zip(numbers, numbers[1:], strict=False))
+    return all(b == a + 1 for a, b in pairwise(numbers))
 
 
 def _width(lines: Sequence[str]) -> int:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from quiltcli.geometry import FloatArray, cross, normalized
-from quiltcli.job import RecordedSpec
 from quiltcli.viewer.recorded import quaternions
 
 EYE = ("x", "y", "z")
@@ -24,7 +23,9 @@ NAMES = ("frame", "time", *(name for group in GROUPS for name in group))
 SHORT: Mapping[str, str] = {
     **dict(zip(("lx", "ly", "lz", "ux", "uy", "uz"), LOOK_AT + UP, strict=True)),
     **dict.fromkeys(("t", "timestamp", "seconds", "time_s", "time (seconds)", "time [s]"), "time"),
-    **{f"{word}{axis}": axis for axis in EYE for word in ("t", "p", "pos_", "position_", "pos.", "position.")},
+    **{
+        f"{word}{axis}": axis for axis in EYE for word in ("t", "p", "pos_", "position_", "pos.", "position.")
+    },
     **{f"q_{axis}": f"q{axis}" for axis in "xyzw"},
     **{f"rot_{axis}": f"q{axis}" for axis in "xyzw"},
 }
@@ -53,7 +54,7 @@ def turn_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def rotations_of(
-    names: Sequence[str], values: FloatArray, spec: RecordedSpec, axes: FloatArray
+    names: Sequence[str], values: FloatArray, order: str | None, axes: FloatArray
 ) -> tuple[FloatArray | None, bool]:
     """Rotations (N, 4) from the columns of a table, and whether they are those of a camera.
 
@@ -63,7 +64,7 @@ def rotations_of(
     Args:
         names: of the columns.
         values: (N, C).
-        spec: for the order of angles.
+        order: in which angles about x, y and z turn; None for x, then y, then z.
         axes: (3, 3) rows that make x right, y up, z back of the file's axes.
     """
     column = {name: values[:, k] for k, name in enumerate(names)}
@@ -79,7 +80,7 @@ def rotations_of(
             return _in_file(quaternions.from_euler(angles, "zxy"), axes), False
         if turn in (ANGLES, ANGLES_RAD):
             angles = group(turn) if turn == ANGLES_RAD else np.radians(group(turn))
-            return angles_to_rotations(angles, spec.rotation_order or "xyz"), False
+            return angles_to_rotations(angles, order or "xyz"), False
         look = group(LOOK) if turn == LOOK else group(LOOK_AT) - group(EYE)
         up = group(UP) if UP[0] in names else np.broadcast_to(axes[1], look.shape)
         right = normalized(cross(look, up))

@@ -64,7 +64,7 @@ def read_named(
     if not len(rows.values):
         raise wrong(spec.file, "holds no samples")
     axes = spec.axis_map if spec.axis_map is not None else Y_UP
-    rotations, is_camera = columns.rotations_of(wanted, rows.values, spec, axes)
+    rotations, is_camera = columns.rotations_of(wanted, rows.values, spec.rotation_order, axes)
     left = [name for name in names if name not in columns.NAMES and name not in _SKIPPED]
     return Recording(
         subject="head",
@@ -105,7 +105,6 @@ def _name_problems(spec: RecordedSpec, names: list[str], line: int) -> list[Prob
     turns = columns.turn_groups(names)
     if len(turns) > 1:
         found.append(problem(f"both {turns[0][0]} and {turns[1][0]} say how the head is turned"))
-    for name in ("yaw", "pitch", "roll", "rx", "ry", "rz"):
-        if name in names:
-            found.append(problem(f"column {name!r} has no unit (name it {name}_deg or {name}_rad)"))
+    angles = (name for name in ("yaw", "pitch", "roll", "rx", "ry", "rz") if name in names)
+    found += [problem(f"column {name!r} has no unit (name it {name}_deg or {name}_rad)") for name in angles]
     return found

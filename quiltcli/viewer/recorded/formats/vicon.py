@@ -1,7 +1,8 @@
-"""CSV files of Vicon Tracker, Nexus and Shogun: tables of objects, segments or trajectories, one below another.
+"""CSV files of Vicon Tracker, Nexus and Shogun: tables, one below another.
 
-Each has a line with its kind, one with the rate, then subjects, axes and units, and ends with a blank
-line. What three angles R mean differs from one program to the next: they are read where it is stated.
+They are of objects, segments or trajectories. Each has a line with its kind, one with the rate, then
+subjects, axes and units, and ends with a blank line. What three angles R mean differs from one program
+to the next: they are read where it is stated.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def read_vicon(spec: RecordedSpec) -> Recording:
     if not len(rows.values):
         raise wrong(spec.file, f"holds no samples of {subject.name}")
     rotations = _rotations(spec, rows.values[:, 4:], subject.turn_unit)
-    notices = ()
+    notices: tuple[str, ...] = ()
     if turns and rotations is None:
         notices = ("its angles were left out, as their meaning is not stated (rotation_order)",)
     return Recording(
