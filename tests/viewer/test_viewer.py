@@ -23,7 +23,8 @@ def viewer_at(viewer, frame, depth="planar"):
 
 def check_viewer(viewer, frames):
     how = SimpleNamespace(depth="planar")
-    return view_problems(SimpleNamespace(people={"": viewer}, is_stereo=False, render=how), frames)
+    job = SimpleNamespace(people={"": viewer}, is_stereo=False, render=how, fps=30)
+    return view_problems(job, frames)
 
 
 def spec(**path: Any) -> ViewerSpec:
@@ -209,13 +210,17 @@ def test_csv_is_read_again_when_it_changes(tmp_path: Path) -> None:
         ("frame,x,y,z,x\n1,0,0,0,0\n", "F:1:13: column 'x' stands twice"),
         ("1,0,0,0\n5,0,0,0\n", "F:2:1: frame 3 is missing between 1 and 5 (add it, or set fill: true)"),
         ("1,0,0,0\n2,0,0,0\n", "csv: frame 3 is not in F (it holds frames 1 to 2)"),
-        ("3,0,0,0\n", "csv: F holds positions only (add look_at, a point, or look, a direction)"),
         ("3,0,0,0,0,0,0\n", "csv: at frame 3 the viewer is where it looks at: there is no direction of view"),
     ],
 )  # fmt: skip
 def test_csv_message(text: str, message: str, tmp_path: Path) -> None:
     problems = check_viewer(track(tmp_path, text), [3])
     assert "\n".join(map(str, problems)).replace(str(tmp_path / "track.csv"), "F") == message
+
+
+def test_csv_of_places_alone_has_no_aim_of_its_own(tmp_path: Path) -> None:
+    with pytest.raises(QuiltError, match=r"csv: .*track.csv holds positions only \(add look_at, a point"):
+        viewer_at(track(tmp_path, "3,0,0,0\n"), 3)
 
 
 def test_csv_tells_all_bad_rows_up_to_twenty(tmp_path: Path) -> None:
