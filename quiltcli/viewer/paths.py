@@ -18,7 +18,7 @@ from quiltcli.job import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, RecordedSpe
 from quiltcli.viewer.interpolation import hold, linear, smooth
 from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.head import pose_of, read_head
-from quiltcli.viewer.recorded.resample import arc
+from quiltcli.viewer.recorded.resample import arc, squad
 from quiltcli.viewer.recorded.rows import Track, read_track
 
 
@@ -49,11 +49,17 @@ def keyframe_pose(path: PathSpec, frame: float, fps: float) -> Pose:
     keys = [key for _, key in numbered]
     # Points aimed at are interpolated as points; only directions are as directions.
     values = np.array([[*key.position, *_aim(key), *key.up] for key in keys])
-    row = INTERPOLATIONS[path.interpolation or "linear"](frames, values, float(frame))
+    kind = path.interpolation or "linear"
+    row = INTERPOLATIONS[kind](frames, values, float(frame))
     eye, aim, up = row[0:3], row[3:6], row[6:9]
     before = max(int(np.searchsorted(frames, frame, side="right")) - 1, 0)
-    look = aim if keys[0].look is not None else aim - eye
-    return Pose(eye, look, up, ("keyframes", numbered[before][0]))
+    blame = ("keyframes", numbered[before][0])
+    if keys[0].aim == "orientation":
+        turns = quaternions.continuous(quaternions.unit(np.array([key.orientation for key in keys])))
+        return _turned(eye, TURNINGS[kind](frames, turns, frame), blame)
+    if not keys[0].aim:
+        return Pose(eye, None, up, blame, "says no direction of view (give look_at, look or orientation)")
+    return Pose(eye, aim if keys[0].look is not None else aim - eye, up, blame)
 
 
 def _aim(key: KeyframeSpec) -> FloatArray:
@@ -66,6 +72,11 @@ def _aim(key: KeyframeSpec) -> FloatArray:
 INTERPOLATIONS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
     "linear": linear,
     "smooth": smooth,
+    "hold": hold,
+}
+TURNINGS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
+    "linear": arc,
+    "smooth": squad,
     "hold": hold,
 }
 

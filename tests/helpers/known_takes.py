@@ -117,8 +117,8 @@ def vicon() -> str:
 
 def trc() -> str:
     text = "PathFileType\t4\t(X/Y/Z)\ttake.trc\n"
-    text += "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
-    text += f"100\t100\t{COUNT}\t2\tmm\t100\t1\t{COUNT}\n"
+    text += "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\n"
+    text += f"100\t100\t{COUNT}\t2\tmm\t100\n"
     text += "Frame#\tTime\tchest\t\t\thead\t\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
     for k in range(COUNT):
         cells = [number(value) for value in (1, 2, 3, *(1000 * PLACES[k]))]

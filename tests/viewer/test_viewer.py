@@ -205,7 +205,8 @@ def test_csv_is_read_again_when_it_changes(tmp_path: Path) -> None:
         ("1,0,0,0\n01,0,0,0\n", "F:2:1: frame 1 is already given in line 1"),
         ("frame,x,y,zz\n1,0,0,0\n",
          "F:1:11: unknown column 'zz' (known: frame, x, y, z, look_at_x, look_at_y, look_at_z, look_x,"
-         " look_y, look_z, up_x, up_y, up_z, qx, qy, qz, qw, yaw_deg, pitch_deg, roll_deg)\nF:1:1: there is no column 'z'"),
+         " look_y, look_z, up_x, up_y, up_z, qx, qy, qz, qw, yaw_deg, pitch_deg, roll_deg)\n"
+         "F:1:1: there is no column 'z'"),
         ("frame,x,y,z,up_x,up_y\n1,0,0,0,0,1\n", "F:1:1: there is no column 'up_z'"),
         ("frame,x,y,z,x\n1,0,0,0,0\n", "F:1:13: column 'x' stands twice"),
         ("1,0,0,0\n5,0,0,0\n", "F:2:1: frame 3 is missing between 1 and 5 (add it, or set fill: true)"),

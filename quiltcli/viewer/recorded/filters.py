@@ -1,4 +1,4 @@
-"""Noise filters of runs of samples: positions in metres, rotations by their logarithms, each on its own."""
+"""Noise filters of runs of samples: positions in metres, rotations as quaternions, each on its own."""
 
 from __future__ import annotations
 
@@ -33,22 +33,17 @@ def filtered(run: Run, spec: FilterSpec, step: float, *, straight: bool = False)
     places, turns = FILTERS[spec.kind](spec, run.times, step)
     rotations = run.rotations
     if rotations is not None:
-        rotations = _turned(rotations, turns, refine=spec.kind != "one_euro")
+        rotations = _turned(rotations, turns)
     return Run(run.times, places(run.positions), rotations)
 
 
-def _turned(q: FloatArray, smoother: Smoother, *, refine: bool) -> FloatArray:
-    """Rotations (N, 4), smoothed.
+def _turned(q: FloatArray, smoother: Smoother) -> FloatArray:
+    """Rotations (N, 4), smoothed: their components, made unit again.
 
-    Smoothed components, made unit again, are near the mean rotation but cut the corner of a sphere.
-    What is left is a small rotation vector, a matter of flat space, and is smoothed once more.
+    Where a filter cuts the sphere's corner it falls short along the radius, which making it unit undoes.
     """
-    # Twice a unit quaternion moves as fast as what it turns, so radians may be thought of.
-    near = quaternions.unit(smoother(2 * q))
-    if refine:
-        left = quaternions.logarithm(quaternions.product(quaternions.inverse(near), q))
-        near = quaternions.product(near, quaternions.exponential(smoother(left)))
-    return quaternions.continuous(near)
+    # Twice a unit quaternion moves as fast as what it turns, so filters may think in radians.
+    return quaternions.continuous(quaternions.unit(smoother(2 * q)))
 
 
 def _savitzky_golay(spec: FilterSpec, times: FloatArray, step: float) -> tuple[Smoother, Smoother]:
