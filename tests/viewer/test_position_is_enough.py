@@ -61,7 +61,7 @@ def test_pictures_are_those_of_a_head_that_looks_somewhere(tmp_path: Path) -> No
 
 
 def test_planar_depth_along_the_line_to_the_middle_is_said_once(tmp_path: Path) -> None:
-    said = [text for text in stage_warnings(set_stage(load_job(job_of(tmp_path, PATHS["csv"], ""))))]
+    said = list(stage_warnings(set_stage(load_job(job_of(tmp_path, PATHS["csv"], "")))))
     assert [text for text in said if "middle" in text] == [
         "the path does not say where the head looks, on which no picture for one eye depends; depth is"
         " measured along the line to the display's middle (render.depth: radial measures the distance)"

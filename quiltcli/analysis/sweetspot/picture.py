@@ -35,8 +35,12 @@ def sweet_spot_picture(spot: SweetSpot, path: Path, measure: str = "p95") -> Non
     Raises:
         OutputError: the name ends in neither .png nor .svg, or the file cannot be written.
     """
+    write_plan(draw_plan(spot, measure), path)
+
+
+def write_plan(plan: Plan, path: Path) -> None:
+    """Write a drawing as .png or .svg, whole or not at all (OutputError)."""
     check_picture(path)
-    plan = draw_plan(spot, measure)
     if path.suffix.lower() == ".svg":
         write_text(path, svg_text(plan))
         return
