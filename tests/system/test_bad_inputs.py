@@ -146,7 +146,7 @@ CASES = [
     Case("path: no keyframe", [swap(JOB, POSES, ""), swap(JOB, "keyframes:", "keyframes: []")], [],
          "job.yaml:9:16: viewer.path.keyframes: expected at least 1 item, got none"),
     Case("path: none", [swap(JOB, PATH, "    interpolation: linear\n")], [],
-         "job.yaml:8:3: viewer.path: expected keyframes, orbit or csv, got none", "job.yaml:9:20: viewer.path.interpolation: belongs to keyframes, and there are none"),
+         "job.yaml:8:3: viewer.path: expected keyframes, orbit, csv or recorded, got none", "job.yaml:9:20: viewer.path.interpolation: belongs to keyframes, and there are none"),
     Case("path: duplicate", [swap(JOB, "frame: 4", "frame: 1")], [],
          "job.yaml:11:15: viewer.path.keyframes[1].frame: frame 1 is already given by keyframes[0]"),
     Case("path: two kinds", [swap(JOB, "    keyframes:", "    orbit: {center: [0, 0, 0], radius: 2, frames_per_turn: 4}\n    keyframes:")], [],

@@ -20,6 +20,11 @@ from quiltcli.viewer.recorded.formats.usd import read_usd
 from quiltcli.viewer.recorded.formats.vicon import is_vicon, read_vicon
 from quiltcli.viewer.recorded.take import Recording
 
+def _read_gltf(spec: RecordedSpec) -> Recording:
+    words = "the animation of glTF nodes is not read yet (export the camera as .chan or USD)"
+    raise ViewerError(spec.source.problem("file", words))
+
+
 FORMATS: dict[str, Callable[[RecordedSpec], Recording]] = {
     "csv": read_own,
     "tum": read_tum,
@@ -32,6 +37,7 @@ FORMATS: dict[str, Callable[[RecordedSpec], Recording]] = {
     "touchdesigner": read_touchdesigner,
     "arkit": read_arkit,
     "hfcs": read_hfcs,
+    "gltf": _read_gltf,
     "usd": read_usd,
 }
 _BY_SUFFIX = {
