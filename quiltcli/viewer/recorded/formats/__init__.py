@@ -20,6 +20,7 @@ from quiltcli.viewer.recorded.formats.usd import read_usd
 from quiltcli.viewer.recorded.formats.vicon import is_vicon, read_vicon
 from quiltcli.viewer.recorded.take import Recording
 
+
 def _read_gltf(spec: RecordedSpec) -> Recording:
     words = "the animation of glTF nodes is not read yet (export the camera as .chan or USD)"
     raise ViewerError(spec.source.problem("file", words))
