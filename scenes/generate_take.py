@@ -33,7 +33,7 @@ def eyes() -> tuple[np.ndarray, np.ndarray, Rotation]:
 
 
 def samples() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Seconds, places (N, 3) and quaternions (N, 4) of the markers; lost ones are not a number."""
+    """Seconds, places (N, 3) and quaternions (N, 4) of the markers as tracked, lost ones not numbers."""
     t, places, turns = eyes()
     dice = np.random.default_rng(12)
     turns = turns * Rotation.from_rotvec(np.radians(0.2) * dice.standard_normal(places.shape))

@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from quiltcli.errors import QuiltError
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded.head import read_head
+from quiltcli.viewer.recorded.head import pose_of, read_head
 from quiltcli.viewer.recorded.take import Take
 from tests.helpers import known_takes as known
+from tests.helpers.gltf_files import GltfFile
 from tests.helpers.known_takes import COUNT, KNOWN, PLACES, PLACES_ALONE, RATE, TIMES, TURNS, write_take
 
 
@@ -205,10 +206,52 @@ def test_usd_cameras_come_with_their_parents_units_and_axes(tmp_path: Path) -> N
         pose[:3, :3], pose[3, :3] = turns[k].as_matrix().T, places[k]
         op.Set(Gf.Matrix4d(pose.tolist()), k)
     stage.GetRootLayer().Save()
-    take = take_of(path)
-    assert take.times == pytest.approx(TIMES)
-    assert np.abs(take.positions - PLACES).max() < 1e-6
-    assert (Rotation.from_quat(take.rotations) * TURNS.inv()).magnitude().max() < 1e-6
+    hold_curve(path)
+
+
+def hold_curve(path: Path, **stated: Any) -> None:
+    """The curve of a file goes through the known poses at their times."""
+    spec = RecordedSpec(file=path, **stated)
+    head = read_head(spec)
+    poses = [pose_of(head, spec, float(time), RATE) for time in TIMES]
+    assert np.abs(np.stack([place for place, _ in poses]) - PLACES).max() < 1e-6
+    found = Rotation.from_quat(np.stack([turn for _, turn in poses if turn is not None]))
+    assert (found * TURNS.inv()).magnitude().max() < 1e-6
+
+
+def test_a_gltf_camera_comes_with_the_nodes_above_it(tmp_path: Path) -> None:
+    # A rig that is moved, turned and scaled, the camera's own animation below it.
+    rig, scale = Rotation.from_euler("xyz", [20, -30, 40], degrees=True), 0.5
+    file = GltfFile()
+    places = rig.inv().apply(PLACES - (1, -2, 0.5)) / scale
+    turns = rig.inv() * TURNS
+    camera = file.add("cameras", type="perspective", perspective={"yfov": 1, "znear": 0.1})
+    head = file.node(name="head", camera=camera)
+    other = file.node(name="rig", children=[head], translation=[1, -2, 0.5], rotation=rig.as_quat().tolist(),
+                      scale=[scale] * 3)  # fmt: skip
+    file.add("scenes", nodes=[other])
+    file.animation(head, "translation", TIMES, places)
+    file.animation(head, "rotation", TIMES, turns.as_quat())
+    path = file.write(tmp_path / "take.glb")
+    hold_curve(path)
+    hold_curve(path, subject="head")
+    assert "did you mean 'head'?" in message(path, subject="haed")
+
+
+def test_a_gltf_node_whose_parent_turns_goes_round(tmp_path: Path) -> None:
+    file = GltfFile()
+    arm = file.node(name="head", translation=[0, 0, 2])
+    hub = file.node(name="hub", children=[arm])
+    file.add("scenes", nodes=[hub])
+    turn = [[0, 0, 0, 1], [0, np.sqrt(0.5), 0, np.sqrt(0.5)]]
+    file.animation(hub, "rotation", [0.0, 1.0], turn)
+    spec = RecordedSpec(file=file.write(tmp_path / "take.glb"), subject="head")
+    place, rotation = pose_of(read_head(spec), spec, 0.371, RATE)
+    angle = np.radians(90 * 0.371)
+    assert place == pytest.approx([2 * np.sin(angle), 0, 2 * np.cos(angle)], abs=3e-6)
+    assert rotation == pytest.approx([0, np.sin(angle / 2), 0, np.cos(angle / 2)], abs=1e-6)
+    # Before and after its keys a curve rests.
+    assert pose_of(read_head(spec), spec, 9.0, RATE)[0] == pytest.approx([2, 0, 0], abs=1e-6)
 
 
 def test_rows_are_read_in_time_that_grows_with_them(tmp_path: Path) -> None:

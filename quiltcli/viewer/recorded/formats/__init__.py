@@ -10,6 +10,7 @@ from quiltcli.job import RecordedSpec
 from quiltcli.viewer.recorded.formats.arkit import read_arkit
 from quiltcli.viewer.recorded.formats.chan import has_frames, read_chan, read_touchdesigner
 from quiltcli.viewer.recorded.formats.freed import read_freed
+from quiltcli.viewer.recorded.formats.gltf import read_gltf
 from quiltcli.viewer.recorded.formats.hfcs import read_hfcs
 from quiltcli.viewer.recorded.formats.motive import is_motive, read_motive
 from quiltcli.viewer.recorded.formats.opentrack import read_opentrack
@@ -19,12 +20,6 @@ from quiltcli.viewer.recorded.formats.tum import read_tum
 from quiltcli.viewer.recorded.formats.usd import read_usd
 from quiltcli.viewer.recorded.formats.vicon import is_vicon, read_vicon
 from quiltcli.viewer.recorded.take import Recording
-
-
-def _read_gltf(spec: RecordedSpec) -> Recording:
-    words = "the animation of glTF nodes is not read yet (export the camera as .chan or USD)"
-    raise ViewerError(spec.source.problem("file", words))
-
 
 FORMATS: dict[str, Callable[[RecordedSpec], Recording]] = {
     "csv": read_own,
@@ -38,7 +33,7 @@ FORMATS: dict[str, Callable[[RecordedSpec], Recording]] = {
     "touchdesigner": read_touchdesigner,
     "arkit": read_arkit,
     "hfcs": read_hfcs,
-    "gltf": _read_gltf,
+    "gltf": read_gltf,
     "usd": read_usd,
 }
 _BY_SUFFIX = {
