@@ -20,7 +20,7 @@ from quiltcli.errors import Problem, ViewerError, raise_all
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.job.model import suggest
 from quiltcli.viewer.recorded import quaternions
-from quiltcli.viewer.recorded.formats.columns import (
+from quiltcli.viewer.recorded.columns import (
     EYE,
     HEADING,
     LOOK,

@@ -13,7 +13,7 @@ import numpy as np
 
 from quiltcli.errors import ViewerError
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded.formats import columns
+from quiltcli.viewer.recorded import columns
 from quiltcli.viewer.recorded.formats.own import read_named
 from quiltcli.viewer.recorded.tables import Dialect, read_rows, take_lines
 from quiltcli.viewer.recorded.take import Y_UP, Recording, wrong

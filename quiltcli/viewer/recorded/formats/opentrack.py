@@ -10,7 +10,7 @@ import numpy as np
 
 from quiltcli.errors import ViewerError
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded.formats.columns import angles_to_rotations
+from quiltcli.viewer.recorded.columns import angles_to_rotations
 from quiltcli.viewer.recorded.tables import dialect_of, read_rows, take_lines
 from quiltcli.viewer.recorded.take import Recording, wrong
 

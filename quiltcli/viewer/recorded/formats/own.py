@@ -11,7 +11,7 @@ import numpy as np
 from quiltcli.errors import Problem, ViewerError, raise_all
 from quiltcli.job import RecordedSpec
 from quiltcli.job.model import suggest
-from quiltcli.viewer.recorded.formats import columns
+from quiltcli.viewer.recorded import columns
 from quiltcli.viewer.recorded.tables import Dialect, dialect_of, read_rows, take_lines
 from quiltcli.viewer.recorded.take import Y_UP, Recording, wrong
 
