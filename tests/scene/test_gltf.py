@@ -14,6 +14,7 @@ from quiltcli.scene.bake import bake, reposed
 from quiltcli.scene.importers.asset import read_asset
 from quiltcli.scene.importers.gltf import Playing, gltf_parts, pose
 from quiltcli.scene.importers.part import placed
+from quiltcli.scene.lights import Directional, Point
 from quiltcli.scene.movers import Mover
 from tests.helpers.gltf_files import SQUARE, GltfFile, one_square
 
@@ -120,19 +121,19 @@ def test_lights_of_the_file_stand_where_the_object_is(tmp_path):
         file, tmp_path, ", transform: {rotate_deg: [0, 90, 0], translate: [0, 0, 4]}}\nlights: file\n"
     )
     # A sun shines along -Z, which the object turns to -X; lux and candela are 683 times watts.
-    assert scene.lights.directional_direction == pytest.approx(np.array([[-1, 0, 0]]), abs=1e-7)
-    assert scene.lights.directional_color.tolist() == [[2, 1, 0]]
-    assert scene.lights.point_position.tolist() == [[0, 1, 4]]
-    assert scene.lights.point_color.tolist() == [[5, 5, 5]]
-    assert not scene.lights.headlight
-    assert scene.lights.ambient.tolist() == [0, 0, 0]
+    sun, lamp = scene.lights
+    assert isinstance(sun, Directional)
+    assert sun.direction == pytest.approx(np.array([-1, 0, 0]), abs=1e-7)
+    assert sun.color.tolist() == [2, 1, 0]
+    assert isinstance(lamp, Point)
+    assert (lamp.position.tolist(), lamp.color.tolist()) == ([0, 1, 4], [5, 5, 5])
     assert scene.notices == ()
 
 
 def test_lights_of_the_file_beside_others_and_by_a_factor(tmp_path):
     text = "}\nlights:\n- {type: file, scale: 10}\n- {type: point, position: [0, 0, 0]}\n"
     scene = scene_of(lit(LAMP), tmp_path, text)
-    assert scene.lights.point_color.tolist() == [[1, 1, 1], [50, 50, 50]]
+    assert [light.color.tolist() for light in scene.lights] == [[1, 1, 1], [50, 50, 50]]
 
 
 def test_spots_and_ranges_are_told(tmp_path):
@@ -145,7 +146,7 @@ def test_spots_and_ranges_are_told(tmp_path):
 
 def test_a_file_without_lamps_is_lit_by_the_headlight(tmp_path):
     scene = scene_of(one_square(), tmp_path, "}\nlights: file\n")
-    assert scene.lights.headlight
+    assert [light.kind for light in scene.lights] == ["ambient", "headlight"]
     assert scene.notices == (f"the scene has no lights{HEADLIGHT}",)
 
 
