@@ -9,7 +9,7 @@ SEEN := out/demo/pictures
 DOCS := docs/pictures
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo pictures test test-long lint types format bench bench-docs packing-table golden clean
+.PHONY: help env demo pictures test test-long lint types format bench bench-docs packing-table golden schema docs dist clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -83,6 +83,12 @@ packing-table: env ## pack every display by every method and write the tables of
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
 	$(PY) -m pytest tests/test_golden.py --update-golden
+
+schema: env ## write the schemas of the YAML files anew, docs/schema
+	$(PY) -m quiltcli.job.schema docs/schema
+
+docs: schema ## the same, and the reference of their keys, docs/reference
+	$(PY) -m quiltcli.job.reference docs/reference
 
 clean: ## remove whatever make and the tests have made, the environment too
 	rm -rf $(ENV) out scenes/out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

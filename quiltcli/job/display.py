@@ -111,9 +111,9 @@ class ResolutionSpec(Model):
     """How many pixels the facets have: one of the two keys."""
 
     pixels_per_metre: Positive | None = None
-    """Pixels a metre, on every facet."""
+    """How dense the pixels are on every facet, pixels a metre."""
     facet_pixels: Size | None = None
-    """Width and height of every facet, for panels."""
+    """Width and height of every facet, for panels, pixels."""
 
     def cross_checks(self) -> Iterator[Complaint]:
         """One of the two."""
@@ -126,7 +126,7 @@ class PlaceOnPage(Model):
     page: Count = 1
     """Page, the first being 1."""
     at: Annotated[tuple[Natural, Natural], Items(2)]
-    """Pixel x, y of the page where the image's top-left pixel lies, after mirroring and turning."""
+    """Where on the page the image's top-left pixel lies, x and y, after mirroring and turning, pixels."""
     rotate: Annotated[Number, AfterValidator(_quarter), WithJsonSchema({"enum": [0, 90, 180, 270]})] = 0
     """Quarter turn of the image in the quilt, clockwise, degrees."""
     mirror: bool = False

@@ -114,7 +114,7 @@ class RenderSpec(Model):
     backface_culling: bool = False
     """Drop triangles that face away from the viewer."""
     bleed: Natural = 2
-    """Pixels rendered past a facet's edge into the padding."""
+    """How far to render past a facet's edge, into the padding, pixels."""
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
@@ -135,7 +135,7 @@ class OutputSpec(Model):
     """What is written."""
 
     directory: AnyPath = Path("out")
-    """Folder of the results."""
+    """Folder of the results, relative to the job."""
     quilts: bool = True
     """Write quilt pages."""
     facets: bool = True

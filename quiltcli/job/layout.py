@@ -35,21 +35,21 @@ class PackSpec(Model):
     method: Annotated[str, OneOf(PACKING_METHODS)] = "auto"
     """Packing method; net takes each facet's raster from the quilt, the others leave it as it is."""
     size: Size | None = None
-    """Width and height of a page, pixels; one page that holds everything when absent."""
+    """Width and height of a page, the smallest that holds everything when absent, pixels."""
     max_pages: Count | None = None
     """Most pages that may be used; any number when absent."""
     padding: Natural = 2
-    """Pixels kept free between facets."""
+    """Room kept free between facets, pixels."""
     aspect: Annotated[float, Field(allow_inf_nan=False, ge=0.01, le=100)] | None = None
     """Width divided by height of a page whose size is not given; any when absent."""
     align: Count = 1
-    """Facets' top-left pixels lie at multiples of this."""
+    """Facets' top-left pixels lie at multiples of this, pixels."""
     mirror: bool = False
     """Whether facets may be mirrored in the quilt."""
     page_facets: Count | None = None
     """Most facets on a page."""
     page_pixels: Count | None = None
-    """Most pixels of facets on a page."""
+    """Most that the facets on a page may take, pixels."""
     pins: AnyPath | None = None
     """A layout file whose facets stay where they are; the others are packed around them."""
     seconds: Positive = 10.0
@@ -94,7 +94,7 @@ class PlaceSpec(Model):
     dv: Direction
     """World step to the next pixel down, metres."""
     polygon: Annotated[tuple[Point, ...], Listed, Field(min_length=3)]
-    """Corners in facet pixels."""
+    """Corners on the facet's raster, pixels."""
 
 
 class LayoutFile(FileModel):
@@ -111,7 +111,7 @@ class LayoutFile(FileModel):
     method: str = "manual"
     """Packing method it was made by."""
     padding: Natural = 0
-    """Pixels kept free between facets."""
+    """Room kept free between facets, pixels."""
     pages: Annotated[tuple[PageSpec, ...], Listed, Field(min_length=1)]
     """Pages of the quilt."""
     facets: Annotated[tuple[PlaceSpec, ...], Listed, Field(min_length=1)]

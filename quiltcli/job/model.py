@@ -227,7 +227,7 @@ class ExistingFile:
         self, schema: cs.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """Text, for editors."""
-        return {"type": "string", "minLength": 1}
+        return {"type": "string", "format": "path", "minLength": 1}
 
     def _check(self, value: Any, info: ValidationInfo) -> Path:
         path = located(value, info)

@@ -25,14 +25,19 @@ def write_schemas(directory: Path) -> None:
         (directory / name).write_text(text, encoding="utf-8")
 
 
-def _text(kind: str) -> str:
+def schema_of(kind: str) -> dict[str, Any]:
+    """The JSON Schema of a kind of file, such as `quilt_job`."""
     model = MODELS[kind]
     schema: dict[str, Any] = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     schema.update(model.model_json_schema(by_alias=True))
     # Python code may leave the version out; a file must not.
     schema["required"] = [kind, *schema.get("required", [])]
     schema["title"] = f"{kind} file"
-    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+    return schema
+
+
+def _text(kind: str) -> str:
+    return json.dumps(schema_of(kind), indent=2, ensure_ascii=False) + "\n"
 
 
 if __name__ == "__main__":

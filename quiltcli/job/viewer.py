@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic_core import core_schema as cs
 
 from quiltcli.errors import JobError
 from quiltcli.job.display import UNITS, Units
@@ -138,7 +148,7 @@ class OrbitSpec(Model):
     end_frame: int | None = None
     """Frame at which the eye is at `end_deg`."""
     look_at: Vec3 | None = None
-    """Point that is looked at; the centre when absent."""
+    """Point that is looked at, the centre when absent, metres."""
     up: Direction = (0.0, 1.0, 0.0)
     """Direction that is up in the view."""
 
@@ -161,11 +171,11 @@ class CsvSpec(Model):
     """CSV file with frame, x, y, z, and if it has them look_at_x … or look_x …, and up_x …; or qx, qy, qz, qw
     or yaw_deg, pitch_deg, roll_deg."""
     units: Units = "m"
-    """What positions are measured in."""
+    """What positions are measured in: m, cm, mm, in, ft, or a number of metres."""
     fill: bool = False
     """Interpolate linearly over frames that have no row; otherwise they are an error."""
     look_at: Vec3 | None = None
-    """Point that is looked at (metres), when the file does not say."""
+    """Point that is looked at, when the file does not say, metres."""
     look: Direction | None = None
     """Direction of view, when the file does not say."""
     up: Direction = (0.0, 1.0, 0.0)
@@ -182,6 +192,21 @@ class CsvSpec(Model):
             yield from exactly_one(self, "look_at", "look")
 
 
+@dataclass(frozen=True)
+class OrFile:
+    """Annotation of a mapping that a file name alone may stand for: its key `file`."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> cs.CoreSchema:
+        """Put the name where it belongs."""
+        return cs.no_info_before_validator_function(_csv, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: cs.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """One or the other, for editors."""
+        return {"anyOf": [{"type": "string", "format": "path", "minLength": 1}, handler(schema)]}
+
+
 def _csv(value: Any) -> Any:
     return value if isinstance(value, (dict, Model)) else {"file": value}
 
@@ -195,9 +220,9 @@ class PathSpec(Model):
     """Between keyframes: linear (the default), smooth, hold."""
     orbit: OrbitSpec | None = None
     """A circle."""
-    csv: Annotated[CsvSpec, BeforeValidator(_csv)] | None = None
+    csv: Annotated[CsvSpec, OrFile()] | None = None
     """A recorded path of one row a frame: a file name, or a mapping with `file`."""
-    recorded: Annotated[RecordedSpec, BeforeValidator(_csv)] | None = None
+    recorded: Annotated[RecordedSpec, OrFile()] | None = None
     """A take of a tracker or a camera: a file name, or a mapping with `file`."""
 
     @model_validator(mode="before")
@@ -265,7 +290,7 @@ class ViewerSpec(Model):
     """The viewer."""
 
     near: Positive
-    """Nearest depth that is drawn, metres from the eye."""
+    """Nearest depth that is drawn, from the eye, metres."""
     far: Positive
     """Farthest depth that is drawn, metres."""
     path: PathSpec
