@@ -141,8 +141,10 @@ def dodecahedron() -> Mesh:
         around = [k for k, face in enumerate(dual.faces) if vertex in face]
         x = centres[around[0]] - axis * (centres[around[0]] @ axis) / (axis @ axis)
         y = np.cross(axis, x) / 0.3
-        turn = [math.atan2(float(centres[k] @ y), float(centres[k] @ x)) % (2 * math.pi) for k in around]
-        mesh.faces.append(tuple(k for _, k in sorted(zip(np.round(turn, 6), around, strict=True))))
+        # In fifths of a turn: the first stands at zero, which noise may put just below a whole turn.
+        turn = [math.atan2(float(centres[k] @ y), float(centres[k] @ x)) for k in around]
+        step = np.round(np.array(turn) / (2 * math.pi / 5)) % 5
+        mesh.faces.append(tuple(k for _, k in sorted(zip(step, around, strict=True))))
     return mesh
 
 
