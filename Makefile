@@ -90,6 +90,9 @@ schema: env ## write the schemas of the YAML files anew, docs/schema
 docs: schema ## the same, and the reference of their keys, docs/reference
 	$(PY) -m quiltcli.job.reference docs/reference
 
+dist: docs ## a wheel and a source distribution, in dist
+	$(PY) -m build --outdir dist .
+
 clean: ## remove whatever make and the tests have made, the environment too
 	rm -rf $(ENV) out scenes/out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -42,6 +42,8 @@ class Model:
     settings: str
 
 
+# What editors check the files by while they are typed.
+SCHEMA = "# yaml-language-server: $schema=../docs/schema/display.schema.json\n"
 WALK_AROUND = "viewing_side: front\n"
 MODELS = {
     "cube5": Model(
@@ -115,7 +117,7 @@ def obj_text(name: str) -> str:
 def display_text(name: str) -> str:
     """A model's display file."""
     model = MODELS[name]
-    return f"# {name}: {model.title}\nquilt_display: 1\nmesh: {name}.obj\n{model.settings}"
+    return f"{SCHEMA}# {name}: {model.title}\nquilt_display: 1\nmesh: {name}.obj\n{model.settings}"
 
 
 def write(folder: Path, names: Iterable[str]) -> None:

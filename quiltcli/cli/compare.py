@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from quiltcli.cli.options import PATH, SETS, THREADS
+from quiltcli.cli.options import PATH, RENDER_METHOD, SETS, THREADS
 from quiltcli.cli.printing import print_aligned
 
 
@@ -14,7 +14,9 @@ from quiltcli.cli.printing import print_aligned
 @click.argument("job", type=PATH)
 @click.option("-f", "--frame", type=int, help="The frame; the job's first by default.")
 @click.option("-o", "--output", type=PATH, help="Folder to write to; compare in the job's by default.")
-@click.option("--method", "methods", multiple=True, help="Only this method; may be given again.")
+@click.option(
+    "--method", "methods", type=RENDER_METHOD, multiple=True, help="Only this method; may be given again."
+)
 @THREADS
 @SETS
 def compare(

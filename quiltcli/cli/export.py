@@ -6,14 +6,17 @@ from pathlib import Path
 
 import click
 
-from quiltcli.cli.options import PATH
+from quiltcli.cli.options import MAP_FORMAT, PATH
 
 
 @click.command()
 @click.argument("layout", type=PATH)
 @click.option("-o", "--output", type=PATH, required=True, help="File to write; its suffix says the format.")
 @click.option(
-    "--format", "format_name", help="obj, csv, json, mpcdi, mpcdi1, st, png or svg, whatever the suffix."
+    "--format",
+    "format_name",
+    type=MAP_FORMAT,
+    help="obj, csv, json, mpcdi, mpcdi1, st, png or svg, whatever the suffix.",
 )
 @click.option("--display", type=PATH, help="Display file, instead of the one the layout names.")
 def export(layout: Path, output: Path, format_name: str | None, display: Path | None) -> None:

@@ -11,8 +11,25 @@ from quiltcli import __version__
 from quiltcli.errors import QuiltError
 
 COMMANDS = (
-    *("check", "compare", "contact", "diff", "export", "import", "info", "pack", "path", "pattern"),
-    *("preview", "render", "simulate", "stereo", "sweetspot", "unmap", "verify", "view"),
+    "check",
+    "compare",
+    "contact",
+    "diff",
+    "export",
+    "import",
+    "info",
+    "pack",
+    "path",
+    "pattern",
+    "preview",
+    "render",
+    "schema",
+    "simulate",
+    "stereo",
+    "sweetspot",
+    "unmap",
+    "verify",
+    "view",
 )
 
 

@@ -6,13 +6,15 @@ from pathlib import Path
 
 import click
 
-from quiltcli.cli.options import PATH, SIZE
+from quiltcli.cli.options import MAP_FORMAT, PATH, SIZE
 
 
 @click.command("import")
 @click.argument("file", type=PATH)
 @click.option("-o", "--output", type=PATH, required=True, help="Layout file to write.")
-@click.option("--format", "format_name", help="obj, csv, json or mpcdi, whatever the suffix.")
+@click.option(
+    "--format", "format_name", type=MAP_FORMAT, help="obj, csv, json or mpcdi, whatever the suffix."
+)
 @click.option("--display", type=PATH, help="Display the layout is for; says what the file does not.")
 @click.option("--size", type=SIZE, help="Page size such as 3840x2160, where the file does not say it.")
 @click.option("--picture", type=PATH, help="Draw the layout, as .png or .svg.")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from quiltcli.errors import JobError
 
@@ -28,6 +29,21 @@ class Parsed(click.ParamType):  # type: ignore[type-arg] # generic only in some 
             return self.read(value)
         except ValueError as error:
             return self.fail(str(error), param, ctx)
+
+
+class Words(click.ParamType):  # type: ignore[type-arg] # generic only in some versions of click
+    """A word that the library judges, and that shells complete."""
+
+    name = "text"
+
+    def __init__(self, known: Callable[[], Iterable[str]]) -> None:
+        self.known = known
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """The known words that begin so."""
+        return [CompletionItem(word) for word in self.known() if word.startswith(incomplete)]
 
 
 def _frames(text: str) -> tuple[int, ...]:
@@ -82,17 +98,56 @@ def _area(text: str) -> tuple[float, ...]:
     return area
 
 
+def _packing_methods() -> Iterable[str]:
+    from quiltcli.layout.packing import METHODS
+
+    return METHODS
+
+
+def _render_methods() -> Iterable[str]:
+    from quiltcli.job.job import METHODS
+
+    return METHODS
+
+
+def _map_formats() -> Iterable[str]:
+    from quiltcli.exchange.pixelmaps import FORMATS
+
+    return FORMATS
+
+
+def _patterns() -> Iterable[str]:
+    from quiltcli.calibration.pattern import KINDS
+
+    return (*KINDS, "all")
+
+
+def _job_keys() -> Iterable[str]:
+    from quiltcli.job.reference import keys
+
+    return (f"{path}=" for path, _ in keys("quilt_job") if "[]" not in path)
+
+
 FRAMES = Parsed("frames", _frames)
 FACETS = Parsed("facets", _facets)
 SIZE = Parsed("size", _size)
 ASPECT = Parsed("aspect", _aspect)
 POINT = Parsed("point", _point)
 AREA = Parsed("area", _area)
+PACKING_METHOD = Words(_packing_methods)
+RENDER_METHOD = Words(_render_methods)
+MAP_FORMAT = Words(_map_formats)
+PATTERN = Words(_patterns)
 VIEW = click.Choice(("aces", "srgb"))
 STILL_VIEW = click.Choice(("aces", "srgb", "raw"))
 THREADS = click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
 SETS = click.option(
-    "--set", "sets", metavar="KEY=VALUE", multiple=True, help="Set a value of the job, by dotted path."
+    "--set",
+    "sets",
+    type=Words(_job_keys),
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Set a value of the job, by dotted path.",
 )
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace images that exist.")
 EXPOSURE = click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")

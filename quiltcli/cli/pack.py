@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import ASPECT, PATH, SIZE
+from quiltcli.cli.options import ASPECT, PACKING_METHOD, PATH, SIZE
 
 
 @click.command()
@@ -15,6 +15,7 @@ from quiltcli.cli.options import ASPECT, PATH, SIZE
 @click.option("-o", "--output", type=PATH, required=True, help="Layout file to write.")
 @click.option(
     "--method",
+    type=PACKING_METHOD,
     help="auto (the best of rects and nest), rows (by id, as people read), rects (bounding rectangles),"
     " maxrects, nest (outlines interlock), net (neighbours stay neighbours at any angle: each facet's"
     " raster is then taken from the quilt, not from the display), or sparrow (a search of minutes for few"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from quiltcli.cli.options import OVERWRITE, PATH
+from quiltcli.cli.options import OVERWRITE, PATH, PATTERN
 
 
 @click.command()
@@ -15,6 +15,7 @@ from quiltcli.cli.options import OVERWRITE, PATH
 @click.option(
     "--kind",
     "kinds",
+    type=PATTERN,
     multiple=True,
     default=("id",),
     show_default=True,

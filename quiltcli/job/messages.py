@@ -50,6 +50,8 @@ def _missing(key: Key, siblings: Sequence[type[BaseModel]]) -> str:
 
 def _unknown(key: Key, siblings: Sequence[type[BaseModel]], root: type[BaseModel]) -> str:
     """Unknown key: the nearest known one, or where it belongs, or what there is."""
+    if key == ("$schema",):
+        return "unknown key (name the schema in a first line '# yaml-language-server: $schema=FILE')"
     names = [name for model in siblings for name in model.model_fields]
     elsewhere = [path for path in _all_keys(root) if path.rpartition(".")[2] == key[-1]]
     if len(elsewhere) == 1:

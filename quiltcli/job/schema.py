@@ -1,6 +1,8 @@
 """JSON Schemas of the four file kinds, for editors that check YAML while it is typed.
 
-`python -m quiltcli.job.schema docs/schema` writes them.
+`python -m quiltcli.job.schema docs/schema` writes them. A YAML file names its schema in a comment,
+`# yaml-language-server: $schema=FILE`, which editors with that language server read; files that come
+with quilt do.
 """
 
 from __future__ import annotations
@@ -16,6 +18,11 @@ from quiltcli.job.load import MODELS
 def schemas() -> dict[str, str]:
     """Text of every schema by file name, `job.schema.json` and so on."""
     return {f"{kind.removeprefix('quilt_')}.schema.json": _text(kind) for kind in MODELS}
+
+
+def schema_text(name: str) -> str:
+    """Text of the schema of `job`, `display`, `layout` or `scene` files."""
+    return _text(f"quilt_{name}")
 
 
 def write_schemas(directory: Path) -> None:

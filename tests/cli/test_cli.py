@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+from click.shell_completion import ShellComplete
 from click.testing import CliRunner, Result
 
 from quiltcli import __version__, cli
@@ -18,6 +19,7 @@ from quiltcli.cli import main
 from quiltcli.cli.group import COMMANDS
 from tests.helpers.tiny_job import IMAGES, SETTINGS, files_in, replaced, write_tiny_job
 
+ROOT = Path(__file__).parents[2]
 EXISTS = "exists already and 11 more (use --resume to keep finished frames, --overwrite to replace them)"
 
 
@@ -96,6 +98,34 @@ def test_a_command_loads_no_other_command() -> None:
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     loaded = {name.rpartition(".")[2] for name in found.stdout.splitlines()[-1].split()}
     assert loaded == {"group", "options", "printing", "diff"}
+
+
+@pytest.mark.parametrize("kind", ["job", "display", "layout", "scene"])
+def test_schema_prints_the_schema_of_a_kind(kind: str, tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "schema" / f"{kind}.schema.json").read_text(encoding="utf-8")
+    assert quilt("schema", kind).stdout == text
+    assert quilt("schema", kind, "-o", str(tmp_path / "s.json")).stdout == ""
+    assert (tmp_path / "s.json").read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize(
+    ("words", "begun", "found"),
+    [
+        (["pack", "--method"], "ne", ["nest", "net"]),
+        (["compare", "--method"], "ras", ["raskar"]),
+        (["export", "--format"], "mpcdi", ["mpcdi", "mpcdi1"]),
+        (["import", "--format"], "o", ["obj"]),
+        (["pattern", "--kind"], "a", ["all"]),
+        (["render", "--set"], "render.sam", ["render.samples="]),
+        ([], "ver", ["verify"]),
+        (["schema"], "", ["job", "display", "layout", "scene"]),
+    ],
+)
+def test_a_shell_completes_commands_and_the_words_that_options_know(
+    words: list[str], begun: str, found: list[str]
+) -> None:
+    shell = ShellComplete(main, {}, "quilt", "_QUILT_COMPLETE")
+    assert [item.value for item in shell.get_completions(words, begun)] == found
 
 
 def test_no_command_shows_the_help() -> None:
