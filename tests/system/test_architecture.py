@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parents[2] / "quiltcli"
 ORDER = (
     *("errors", "geometry", "channels", "formats", "job", "display", "scene", "viewer", "layout"),
     *("projection", "visibility", "shading", "images", "render", "calibration", "analysis", "exchange"),
-    *("cli", "__main__"),
+    *("api", "cli", "__main__"),
 )
 LIGHT = {"quiltcli.errors", "quiltcli"}
 STANDARD = {
