@@ -61,9 +61,10 @@ test: env lint types ## lint, types and all tests but the long ones
 test-long: env ## the tests that take minutes
 	$(PY) -m pytest -n 2 -m long
 
-lint: env ## ruff: mistakes and layout of the code
+lint: env ## mistakes and layout of the code (ruff), misspelt words (codespell)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
+	$(PY) -m codespell_lib
 
 types: env ## mypy, strict
 	$(PY) -m mypy
