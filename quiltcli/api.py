@@ -160,7 +160,7 @@ def draw(what: Setup | Job, frames: Iterable[int] | None = None, *, threads: int
     job = setup.job
     views = views_of(job, job.frames if frames is None else frames)
     everybody = [viewer for view in views for viewer in view.viewers]
-    raise_all(ViewerError, eye_problems(setup.facets, everybody, job.viewer.source))
+    raise_all(ViewerError, eye_problems(setup.facets, everybody, job))
     for view in views:
         buffers = new_buffers(setup)
         record = draw_view(setup.at(view.frame), view, buffers, threads or default_threads())

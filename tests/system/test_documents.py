@@ -17,7 +17,7 @@ PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / ".github")
 
 def anchors(page: Path) -> set[str]:
     """Names of a page's headings, as the web shows them."""
-    headings = re.findall(r"^#+ (.*)", page.read_text(encoding="utf-8"), re.MULTILINE)
+    headings = re.findall(r"^##* (.*)", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w-]", "", heading.lower().replace(" ", "-")) for heading in headings}
 
 
@@ -60,3 +60,22 @@ def test_workflows_try_every_python_that_is_promised() -> None:
     promised = re.findall(r"Python :: (3\.\d+)", "\n".join(project["classifiers"]))
     assert tried == promised
     assert project["requires-python"] == f">={tried[0]}"
+
+
+def test_files_and_tables_that_the_architecture_names_are_there() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:quiltcli|display_models|tests|render|viewer|cli)/[\w/.]*)`", text))
+    assert len(named) > 20
+    lost = {name for name in named if not ((ROOT / name).exists() or (ROOT / "quiltcli" / name).exists())}
+    assert lost == set()
+    tables = re.findall(r"`([A-Z]{4,})`[^`]*?`(quiltcli/[\w/]+\.py)`", text)
+    assert {name for name, file in tables if name not in (ROOT / file).read_text(encoding="utf-8")} == set()
+
+
+def test_the_architecture_lists_the_rooms_in_their_order() -> None:
+    from tests.system.test_architecture import ORDER
+
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    rooms = text.partition("## The rooms")[2].partition("## The words")[0]
+    rows = re.findall(r"^\| (`.*?) \|", rooms, re.MULTILINE)
+    assert re.findall(r"`(\w+)`", " ".join(rows)) == [room for room in ORDER if room != "__main__"]

@@ -48,7 +48,7 @@ def type_of(schema: dict[str, Any], node: dict[str, Any], places: dict[int, str]
     if kind == "array":
         return _list_type(schema, node, places)
     if kind == "object":
-        return f"by id, a {type_of(schema, node['additionalProperties'], places)}"
+        return f"{type_of(schema, node['additionalProperties'], places)} by id or name"
     if isinstance(kind, list):
         return " or ".join(_WORDS[word] for word in kind if word != "null")
     if node.get("minimum", 0) == node.get("maximum"):
