@@ -83,7 +83,7 @@ packing-table: env ## pack every display by every method and write the tables of
 	$(PY) -m tests.benchmarks.packing --write docs/packing.md
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
-	$(PY) -m pytest tests/test_golden.py --update-golden
+	$(PY) -m pytest tests/system/test_golden.py --update-golden
 
 schema: env ## write the schemas of the YAML files anew, docs/schema
 	$(PY) -m quiltcli.job.schema docs/schema

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -39,6 +39,24 @@ def complaint(message: str, *at: str | int) -> PydanticCustomError:
 def complaints(found: Sequence[Complaint]) -> PydanticCustomError:
     """As `complaint`, for several at once."""
     return PydanticCustomError("quilt", "{text}", {"text": found[0][1], "found": list(found)})
+
+
+@dataclass(frozen=True, eq=False)
+class ShortFor:
+    """A value that may stand for a mapping: `read` makes the one of the other, `schema` says what it is."""
+
+    read: Callable[[Any], Any]
+    schema: dict[str, Any]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> cs.CoreSchema:
+        """Put the value where it belongs."""
+        return cs.no_info_before_validator_function(self.read, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: cs.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """One or the other, for editors."""
+        return {"anyOf": [self.schema, handler(schema)]}
 
 
 def describe(value: Any) -> str:

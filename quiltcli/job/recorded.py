@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, Field
 
 from quiltcli.geometry import FloatArray
 from quiltcli.job.display import UNITS, TransformSpec, Units
@@ -23,6 +23,7 @@ from quiltcli.job.model import (
     Number,
     OneOf,
     Positive,
+    ShortFor,
     Vec3,
     complaint,
     exactly_one,
@@ -108,6 +109,9 @@ class MarkerSpec(Model):
     """How the head is turned in the marker's axes: about X, then Y, then Z, degrees."""
 
 
+_PLACE = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+
+
 def _marker(value: Any) -> Any:
     return {"translate": value} if isinstance(value, (list, tuple)) else value
 
@@ -126,7 +130,7 @@ class RecordedSpec(Model):
     subject: str | None = None
     """Rigid body, marker, node, camera or prim, where the file has several."""
     units: Units | None = None
-    """What positions are measured in, where the file does not say."""
+    """What positions are measured in, where the file does not say: m, cm, mm, in, ft or metres."""
     up_axis: Annotated[str, OneOf(("y", "z"))] | None = None
     """The axis that is up in the file; where that is z, an unturned head looks along +Y."""
     axes: (
@@ -147,7 +151,7 @@ class RecordedSpec(Model):
     """Samples a second, where the file has no times."""
     world_from_tracker: TransformSpec | None = None
     """Place of the tracker's axes in the world: rigid, or scaled alike in all directions."""
-    eye_from_marker: Annotated[MarkerSpec, BeforeValidator(_marker)] | None = None
+    eye_from_marker: Annotated[MarkerSpec, ShortFor(_marker, _PLACE)] | None = None
     """Place of the eye in the marker's axes, metres; or a mapping with translate and rotate_deg."""
     time_offset: Number = 0.0
     """Seconds added to every stamp."""
@@ -159,7 +163,7 @@ class RecordedSpec(Model):
     """Frame that shows second `start`."""
     gaps: GapsSpec = GapsSpec()
     """What becomes of times at which nothing was recorded."""
-    filter: Annotated[FilterSpec, BeforeValidator(_filter)] = FilterSpec(kind="none")
+    filter: Annotated[FilterSpec, ShortFor(_filter, {"type": "string"})] = FilterSpec(kind="none")
     """Noise filter: its name, or a mapping with `kind` and its parameters."""
     look_at: Vec3 | None = None
     """Point that is looked at (metres), whatever the take says."""

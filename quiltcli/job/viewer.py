@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,12 +11,9 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
     WithJsonSchema,
     model_validator,
 )
-from pydantic_core import core_schema as cs
 
 from quiltcli.errors import JobError
 from quiltcli.job.display import UNITS, Units
@@ -32,6 +28,7 @@ from quiltcli.job.model import (
     Number,
     OneOf,
     Positive,
+    ShortFor,
     Vec3,
     complaint,
     describe,
@@ -192,23 +189,11 @@ class CsvSpec(Model):
             yield from exactly_one(self, "look_at", "look")
 
 
-@dataclass(frozen=True)
-class OrFile:
-    """Annotation of a mapping that a file name alone may stand for: its key `file`."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> cs.CoreSchema:
-        """Put the name where it belongs."""
-        return cs.no_info_before_validator_function(_csv, handler(source))
-
-    def __get_pydantic_json_schema__(
-        self, schema: cs.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """One or the other, for editors."""
-        return {"anyOf": [{"type": "string", "format": "path", "minLength": 1}, handler(schema)]}
-
-
 def _csv(value: Any) -> Any:
     return value if isinstance(value, (dict, Model)) else {"file": value}
+
+
+OR_FILE = ShortFor(_csv, {"type": "string", "format": "path", "minLength": 1})
 
 
 class PathSpec(Model):
@@ -220,9 +205,9 @@ class PathSpec(Model):
     """Between keyframes: linear (the default), smooth, hold."""
     orbit: OrbitSpec | None = None
     """A circle."""
-    csv: Annotated[CsvSpec, OrFile()] | None = None
+    csv: Annotated[CsvSpec, OR_FILE] | None = None
     """A recorded path of one row a frame: a file name, or a mapping with `file`."""
-    recorded: Annotated[RecordedSpec, OrFile()] | None = None
+    recorded: Annotated[RecordedSpec, OR_FILE] | None = None
     """A take of a tracker or a camera: a file name, or a mapping with `file`."""
 
     @model_validator(mode="before")
