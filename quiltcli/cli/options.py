@@ -62,7 +62,7 @@ def _size(text: str) -> tuple[int, int] | None:
     if text == "auto":
         return None
     if text.isalnum() and not text[0].isdigit():
-        from quiltcli.layout.packing import CANVASES
+        from quiltcli.job.layout import CANVASES
 
         if text in CANVASES:
             return CANVASES[text]
@@ -73,7 +73,7 @@ def _size(text: str) -> tuple[int, int] | None:
 
 
 def _aspect(text: str) -> Any:
-    from quiltcli.layout.packing import read_aspect
+    from quiltcli.job.layout import read_aspect
 
     return read_aspect(text)
 

@@ -16,10 +16,10 @@ from quiltcli.cli.options import ASPECT, PACKING_METHOD, PATH, SIZE
 @click.option(
     "--method",
     type=PACKING_METHOD,
-    help="auto (the best of rects and nest), rows (by id, as people read), rects (bounding rectangles),"
-    " maxrects, nest (outlines interlock), net (neighbours stay neighbours at any angle: each facet's"
-    " raster is then taken from the quilt, not from the display), or sparrow (a search of minutes for few"
-    " facets, by the optional package spyrrow; its layouts differ from run to run).",
+    default="auto",
+    help="auto (the best of rects and nest), rows (by id, as people read), rects or maxrects (bounding"
+    " rectangles), nest (outlines interlock), or net (neighbours stay neighbours at any angle: each facet's"
+    " raster is then taken from the quilt, not from the display).",
 )
 @click.option(
     "--size",
@@ -39,15 +39,13 @@ from quiltcli.cli.options import ASPECT, PACKING_METHOD, PATH, SIZE
 @click.option(
     "--seconds",
     type=click.FloatRange(min=0, min_open=True),
-    help="Effort, 10 by default: seconds on a slow computer; every computer packs alike (not sparrow).",
+    default=10.0,
+    help="Effort, 10 by default: seconds on a slow computer; every computer packs alike.",
 )
 @click.option("--picture", type=PATH, help="Draw the layout, as .png or .svg.")
 def pack(
     display: Path,
     output: Path,
-    method: str | None,
-    pins: Path | None,
-    seconds: float | None,
     picture: Path | None,
     **wishes: Any,
 ) -> None:
@@ -56,19 +54,12 @@ def pack(
     By every method but net a facet's own pixels are the quilt's pixels, moved and perhaps turned.
     """
     from quiltcli.display import load_display
-    from quiltcli.job import load_display_file
-    from quiltcli.layout import fill, layout_picture, read_layout, write_layout
-    from quiltcli.layout.packing import DEFAULT_METHOD, DEFAULT_SECONDS
+    from quiltcli.job import load_display_file, pack_spec
+    from quiltcli.layout import fill, layout_picture, write_layout
     from quiltcli.layout.packing import pack as pack_facets
 
     facets = load_display(load_display_file(display))
-    layout = pack_facets(
-        facets,
-        method or DEFAULT_METHOD,
-        pins=read_layout(pins) if pins is not None else None,
-        seconds=seconds or DEFAULT_SECONDS,
-        **wishes,
-    )
+    layout = pack_facets(facets, pack_spec(**wishes))
     write_layout(layout, output)
     if picture is not None:
         layout_picture(layout, picture, facets=facets)

@@ -8,7 +8,16 @@ from quiltcli.job.digest import file_sha256, job_sha256
 from quiltcli.job.display import UNITS, DisplayFile, FacetSpec, ResolutionSpec, TransformSpec
 from quiltcli.job.dump import dump_job, dump_yaml
 from quiltcli.job.job import COMPRESSIONS, JobFile, OutputSpec, RenderSpec
-from quiltcli.job.layout import PACKING_METHODS, LayoutFile, PackSpec, PageSpec, PlaceSpec, UvLayoutSpec
+from quiltcli.job.layout import (
+    CANVASES,
+    PACKING_METHODS,
+    LayoutFile,
+    PackSpec,
+    PageSpec,
+    PlaceSpec,
+    UvLayoutSpec,
+    read_aspect,
+)
 from quiltcli.job.load import (
     check_file,
     file_kind,
@@ -16,6 +25,7 @@ from quiltcli.job.load import (
     load_job,
     load_layout_file,
     load_scene_file,
+    pack_spec,
 )
 from quiltcli.job.recorded import FilterSpec, GapsSpec, MarkerSpec, RecordedSpec
 from quiltcli.job.scene import (
@@ -30,6 +40,7 @@ from quiltcli.job.scene import (
 from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, ViewerSpec
 
 __all__ = [
+    "CANVASES",
     "COMPRESSIONS",
     "PACKING_METHODS",
     "UNITS",
@@ -71,4 +82,6 @@ __all__ = [
     "load_job",
     "load_layout_file",
     "load_scene_file",
+    "pack_spec",
+    "read_aspect",
 ]

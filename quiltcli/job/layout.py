@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from fractions import Fraction
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, PlainValidator, WithJsonSchema
 
+from quiltcli.errors import JobError
 from quiltcli.job.model import (
     AnyPath,
     Complaint,
@@ -22,26 +24,75 @@ from quiltcli.job.model import (
     Positive,
     Size,
     Vec3,
+    complaint,
+    describe,
 )
 
 # Names of the packing stage, which comes later; known here so that a wrong one is shown in its line.
-# A method that reads a clock is not among them: machines that share a job would disagree about its layout.
-PACKING_METHODS = ("auto", "rows", "rects", "maxrects", "nest", "net")
+PACKING_METHODS = {
+    "auto": "auto",
+    "rows": "rows",
+    "rects": "rects",
+    "maxrects": "rects",
+    "nest": "nest",
+    "net": "net",
+}
+"""Names of packing methods, and the method each stands for: `maxrects` is another name of `rects`."""
+
+
+CANVASES = {"uhd": (3840, 2160), "dci4k": (4096, 2160), "uhd8k": (7680, 4320)}
+"""Page sizes that have a name: what LED processors and projectors take."""
+
+
+def read_aspect(text: str) -> Fraction:
+    """The aspect, width / height, written as 16:9, 16x9, 16/9 or 1.85.
+
+    Raises:
+        JobError: it is none of these, or not between 1:100 and 100:1.
+    """
+    aspect = _aspect_of(text)
+    if aspect is None:
+        raise JobError(f"expected an aspect such as 16:9 or 1.85, got {text!r}")
+    return aspect
+
+
+def _aspect_of(value: object) -> Fraction | None:
+    parts = str(value).lower().replace("x", ":").replace("/", ":").split(":")
+    try:
+        aspect = Fraction(parts[0]) / Fraction(parts[1] if len(parts) > 1 else "1")
+    except (ValueError, ZeroDivisionError):
+        return None
+    return aspect if len(parts) < 3 and Fraction(1, 100) <= aspect <= 100 else None
+
+
+def _aspect(value: Any) -> Fraction:
+    aspect = None if isinstance(value, bool) else _aspect_of(value)
+    if aspect is None:
+        raise complaint(f"expected an aspect such as 16:9 or 1.85, got {describe(value)}")
+    return aspect
+
+
+Aspect = Annotated[
+    Fraction,
+    PlainValidator(_aspect),
+    WithJsonSchema({"type": ["number", "string"], "examples": ["16:9", 1.85]}),
+]
 
 
 class PackSpec(Model):
     """How to pack the facets of a display onto quilt pages."""
 
-    method: Annotated[str, OneOf(PACKING_METHODS)] = "auto"
-    """Packing method; net takes each facet's raster from the quilt, the others leave it as it is."""
+    method: Annotated[str, OneOf(tuple(PACKING_METHODS))] = "auto"
+    """Packing method; net takes each facet's raster from the quilt, the others leave it as it is. Another
+    name of rects is maxrects."""
     size: Size | None = None
     """Width and height of a page, the smallest that holds everything when absent, pixels."""
     max_pages: Count | None = None
     """Most pages that may be used; any number when absent."""
     padding: Natural = 2
     """Room kept free between facets, pixels."""
-    aspect: Annotated[float, Field(allow_inf_nan=False, ge=0.01, le=100)] | None = None
-    """Width divided by height of a page whose size is not given; any when absent."""
+    aspect: Aspect | None = None
+    """Width to height of a page whose size is not given, such as 16:9 or 1.85; any when absent."""
     align: Count = 1
     """Facets' top-left pixels lie at multiples of this, pixels."""
     mirror: bool = False
@@ -54,6 +105,19 @@ class PackSpec(Model):
     """A layout file whose facets stay where they are; the others are packed around them."""
     seconds: Positive = 10.0
     """Effort, in seconds on a slow computer; the result does not depend on the computer."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """Wishes that exclude each other."""
+        limits = [name for name in ("page_facets", "page_pixels") if getattr(self, name) is not None]
+        if self.size is not None and self.aspect is not None:
+            yield ("aspect",), "a page size and an aspect: give one, since the size has an aspect"
+        if limits and self.size is None:
+            yield (limits[0],), "limits of a page need a page size"
+        if limits and self.pins is not None:
+            yield (limits[0],), "limits of a page and pins cannot be combined"
+        if self.method == "net" and (self.align > 1 or self.mirror):
+            odd = "align" if self.align > 1 else "mirror"
+            yield (odd,), "the method net lays facets at any angle, so it can neither align nor mirror them"
 
 
 class UvLayoutSpec(Model):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -87,6 +87,18 @@ def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
         job = job.model_copy(update={"layout": display.layout or PackSpec()})
         attach(job, found.source)
     return job
+
+
+def pack_spec(**wishes: Any) -> PackSpec:
+    """How to pack, from values that stand in no file; `PackSpec` has their names, meanings and defaults.
+
+    Raises:
+        JobError: with everything that makes no sense.
+    """
+    try:
+        return PackSpec.model_validate(wishes)
+    except ValidationError as error:
+        raise JobError(problems_of(error, PackSpec, Source())) from None
 
 
 def file_kind(path: Path | str) -> str:

@@ -12,7 +12,6 @@ from quiltcli.display import Facets, lit_facets, load_display
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.job import JobFile, ResolutionSpec, load_display_file
 from quiltcli.layout import align
-from quiltcli.layout.packing import pack
 from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.crew import plan_of
 from quiltcli.render.setup import Stage, stage_of
@@ -23,6 +22,7 @@ from quiltcli.visibility.draw import Frame, Wanted, batches, rasterize
 from quiltcli.visibility.shares import bin_frame
 from tests.benchmarks.meshes import Mesh, scene_of
 from tests.helpers.in_memory import CUBE, CUBE_FACES, display, icosphere, viewer
+from tests.helpers.packed_layouts import pack
 
 EYE = np.array([2.2, 1.8, 3.2])
 """Where the eye is, from the middle of a display that reaches 1 to all sides."""

@@ -22,7 +22,6 @@ from quiltcli.exchange.pixelmaps.naming import existing_pages
 from quiltcli.exchange.pixelmaps.placing import panel
 from quiltcli.job import load_display_file
 from quiltcli.layout import read_layout, write_layout
-from quiltcli.layout.packing import pack
 from tests.helpers.flat_displays import flat_display, placed, rectangle
 from tests.helpers.map_displays import (
     BOTH_WAYS,
@@ -34,6 +33,7 @@ from tests.helpers.map_displays import (
     turned,
     world_of_pixels,
 )
+from tests.helpers.packed_layouts import pack
 from tests.helpers.turned_layout import SIZE, turned_display, turned_layout
 
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)

@@ -12,9 +12,9 @@ from quiltcli.exchange.pixelmaps.naming import existing_pages
 from quiltcli.formats.mesh import read_mesh
 from quiltcli.job import load_display_file
 from quiltcli.layout import layout_from_uv
-from quiltcli.layout.packing import pack
 from tests.helpers.flat_displays import flat_display, moved, placed, rectangle
 from tests.helpers.map_displays import assert_same_places, cave, cube, turned, world_of_pixels
+from tests.helpers.packed_layouts import pack
 
 
 def test_a_mesh_holds_metres_and_texture_coordinates(tmp_path):

@@ -7,10 +7,10 @@ import numpy as np
 from quiltcli.display import Facets
 from quiltcli.job import JobFile
 from quiltcli.layout import align
-from quiltcli.layout.packing import pack
 from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene import Light, Scene
 from tests.helpers.in_memory import icosphere
+from tests.helpers.packed_layouts import pack
 from tests.helpers.wall_scene import lights, wall
 
 

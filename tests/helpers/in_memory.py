@@ -11,7 +11,6 @@ from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot, normalized
 from quiltcli.job import DisplayFile
 from quiltcli.layout import Layout, align, pixel_owners
-from quiltcli.layout.packing import pack
 from quiltcli.projection.planar import QuiltRays, quilt_rays
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.binning.pairs import Cores, Pairs, Parts, facet_parts, lit_cones, pairs_of
@@ -25,6 +24,7 @@ from quiltcli.visibility.draw import (
     rasterize,
     triangles_in_range,
 )
+from tests.helpers.packed_layouts import pack
 
 
 def display(vertices: object, polygons: list[list[int]], density: float = 100, **keys: object) -> Facets:

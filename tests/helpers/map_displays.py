@@ -11,7 +11,7 @@ from quiltcli.display import load_display
 from quiltcli.exchange.pixelmaps import FORMATS
 from quiltcli.job import ResolutionSpec, load_display_file
 from quiltcli.layout import pixel_owners
-from quiltcli.layout.packing import pack
+from tests.helpers.packed_layouts import pack
 from tests.helpers.turned_layout import turned_display, turned_layout
 
 MODELS = Path(__file__).parents[2] / "display_models"

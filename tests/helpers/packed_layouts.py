@@ -1,15 +1,16 @@
-"""What every packed layout must keep, counted pixel by pixel."""
+"""Packed layouts, and what every one must keep, counted pixel by pixel."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from quiltcli.display import Facets, corner_pixels, load_display
-from quiltcli.job import load_display_file
-from quiltcli.layout import Layout, pixel_owners
+from quiltcli.job import load_display_file, pack_spec
+from quiltcli.layout import Layout, packing, pixel_owners, write_layout
 from quiltcli.layout.packing import PackInput
 from quiltcli.layout.spans import facet_spans
 
@@ -19,6 +20,23 @@ MODELS = Path(__file__).parents[2] / "display_models"
 def model(name: str) -> Facets:
     """A display of display_models/."""
     return load_display(load_display_file(MODELS / f"{name}.yaml"))
+
+
+def pack(
+    facets: Facets,
+    method: str = "auto",
+    size: tuple[int, int] | None = None,
+    padding: int = 2,
+    *,
+    pins: Layout | None = None,
+    **wishes: Any,
+) -> Layout:
+    """A display packed as asked; `pins` is a layout instead of its file."""
+    with TemporaryDirectory() as folder:
+        if pins is not None:
+            wishes["pins"] = Path(folder) / "pins.yaml"
+            write_layout(pins, wishes["pins"])
+        return packing.pack(facets, pack_spec(method=method, size=size, padding=padding, **wishes))
 
 
 def collisions(layout: Layout, padding: int) -> int:

@@ -269,9 +269,9 @@ def test_schemas_in_the_docs_are_up_to_date() -> None:
 
 
 def test_names_shared_with_later_stages() -> None:
-    from quiltcli.layout.packing import STEADY
+    from quiltcli.layout.packing import METHODS
 
-    assert set(PACKING_METHODS) == set(STEADY)
+    assert set(PACKING_METHODS.values()) == set(METHODS)
     assert "zip" in COMPRESSIONS
 
 

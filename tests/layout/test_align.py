@@ -7,8 +7,8 @@ import pytest
 
 from quiltcli.errors import LayoutError
 from quiltcli.layout import align, read_layout, write_layout
-from quiltcli.layout.packing import pack
 from tests.helpers.flat_displays import PITCH, flat_display, moved, placed, rectangle
+from tests.helpers.packed_layouts import pack
 
 TWO = flat_display([rectangle(4, 3)] * 2, names=["left", "right"])
 GOOD = placed(TWO, [moved(0, 0), moved(5, 0)])

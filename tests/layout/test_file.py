@@ -13,8 +13,8 @@ from quiltcli.errors import JobError, LayoutError, OutputError
 from quiltcli.formats.yaml.source import read_yaml
 from quiltcli.layout import check_layout, layout_text, read_layout, write_layout
 from quiltcli.layout.file import number_text
-from quiltcli.layout.packing import pack
 from tests.helpers.flat_displays import flat_display, moved, placed, random_polygons, rectangle
+from tests.helpers.packed_layouts import pack
 
 GOOD = """\
 quilt_layout: 1

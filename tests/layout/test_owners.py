@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from quiltcli.errors import LayoutError
 from quiltcli.layout import Layout, facet_spans, fill, pixel_owners, quilt_polygons
-from quiltcli.layout.packing import pack
 from tests.helpers.flat_displays import flat_display, moved, placed, random_polygons, rectangle, tiling
+from tests.helpers.packed_layouts import pack
 
 
 def picture(layout, bleed=0.0, page=0):

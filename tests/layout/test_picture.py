@@ -9,9 +9,9 @@ from PIL import Image
 from quiltcli.errors import OutputError
 from quiltcli.formats.drawing.shapes import Label, Shape
 from quiltcli.layout import layout_picture
-from quiltcli.layout.packing import pack
 from quiltcli.layout.picture.drawing import draw_layout
 from tests.helpers.flat_displays import flat_display, moved, placed, random_polygons, rectangle
+from tests.helpers.packed_layouts import pack
 
 TWO = flat_display([rectangle(40, 30)] * 2, names=["left", "top <1>"])
 LAYOUT = placed(TWO, [moved(0, 0), [[0, -1, 80], [1, 0, 10]]], (100, 60))

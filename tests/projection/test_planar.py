@@ -8,9 +8,9 @@ import pytest
 from quiltcli.display import lit_facets
 from quiltcli.geometry import normalized, segments
 from quiltcli.layout import align, quilt_polygons
-from quiltcli.layout.packing import pack
 from quiltcli.projection.planar import plane_homography, quilt_rays
 from tests.helpers.in_memory import cube, panel, viewer
+from tests.helpers.packed_layouts import pack
 
 EYE = np.array([1.7, 2.1, 2.9])
 
@@ -18,7 +18,7 @@ EYE = np.array([1.7, 2.1, 2.9])
 @pytest.fixture(scope="module")
 def cube_rays():
     facets = cube()
-    facets, layout = align(pack(facets, "maxrects"), facets)
+    facets, layout = align(pack(facets, "rects"), facets)
     return facets, layout, quilt_rays(facets, layout, lit_facets(facets, EYE), EYE)
 
 

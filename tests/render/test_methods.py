@@ -14,7 +14,6 @@ from quiltcli.errors import JobError
 from quiltcli.geometry import cross, dot
 from quiltcli.job import load_job
 from quiltcli.layout import align
-from quiltcli.layout.packing import pack
 from quiltcli.projection.camera import viewer_frustum
 from quiltcli.projection.planar import plane_homography, quilt_rays
 from quiltcli.render.buffers import new_buffers
@@ -34,6 +33,7 @@ from quiltcli.visibility.scan.depth_buffers import (
     rounded,
     uniform_scale,
 )
+from tests.helpers.packed_layouts import pack
 from tests.helpers.tiny_job import write_tiny_job
 
 SCENES = Path(__file__).parents[2] / "scenes"

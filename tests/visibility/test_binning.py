@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from quiltcli.display import lit_facets
 from quiltcli.geometry import dot
 from quiltcli.layout import align
-from quiltcli.layout.packing import pack
 from quiltcli.visibility.binning import pairs as binning
 from quiltcli.visibility.binning.broad import ConeGrids, candidate_pairs, cube_faces
 from quiltcli.visibility.binning.cones import by_corner, cone_planes, overlapping
@@ -18,6 +17,7 @@ from quiltcli.visibility.binning.cores import facet_cores
 from quiltcli.visibility.binning.pairs import Cores, facet_parts, lit_cones
 from quiltcli.visibility.draw import triangles_in_range
 from tests.helpers.in_memory import CUBE, CUBE_FACES, bin_triangles, cube, display, icosphere, panel, viewer
+from tests.helpers.packed_layouts import pack
 
 
 def sphere_display():

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 
 from quiltcli.display import Facets
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
 from quiltcli.layout import Layout, align, layout_from_uv, read_layout
-from quiltcli.layout.packing.pack import pack_target
-from quiltcli.layout.packing.wishes import Target
+from quiltcli.layout.packing.pack import pack
 
 
 def layout_for(choice: Path | PackSpec | UvLayoutSpec, facets: Facets) -> tuple[Facets, Layout]:
@@ -22,25 +20,9 @@ def layout_for(choice: Path | PackSpec | UvLayoutSpec, facets: Facets) -> tuple[
         JobError, LayoutError: as `read_layout`, `pack`, `layout_from_uv` and `align` do.
     """
     if isinstance(choice, PackSpec):
-        layout = pack_target(facets, _target(choice))
+        layout = pack(facets, choice)
     elif isinstance(choice, UvLayoutSpec):
         layout = layout_from_uv(facets, choice.size)
     else:
         layout = read_layout(choice)
     return align(layout, facets)
-
-
-def _target(spec: PackSpec) -> Target:
-    return Target(
-        method=spec.method,
-        size=spec.size,
-        padding=spec.padding,
-        max_pages=spec.max_pages,
-        aspect=None if spec.aspect is None else Fraction(str(spec.aspect)),
-        align=spec.align,
-        mirror=spec.mirror,
-        page_facets=spec.page_facets,
-        page_pixels=spec.page_pixels,
-        pins=None if spec.pins is None else read_layout(spec.pins),
-        seconds=spec.seconds,
-    )

@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from quiltcli.layout.packing.attempt import Attempt, Method
 from quiltcli.layout.packing.model import PackInput
 from quiltcli.layout.packing.outlines.nest import nest_attempts
-from quiltcli.layout.packing.outlines.sparrow import sparrow_attempts
-from quiltcli.layout.packing.rectangles.rects import maxrects_attempts, rects_attempts, rows_attempts
+from quiltcli.layout.packing.rectangles.rects import rects_attempts, rows_attempts
 from quiltcli.layout.packing.unfolding.net import net_attempts
 
 _SPARSE = 0.7  # of its rectangles a display must fill for rectangles to have a chance
@@ -29,12 +28,6 @@ METHODS: Mapping[str, Method] = {
     "auto": _auto,
     "rows": _alone(rows_attempts),
     "rects": _alone(rects_attempts),
-    "maxrects": _alone(maxrects_attempts),
     "nest": _alone(nest_attempts),
     "net": _alone(net_attempts),
-    "sparrow": lambda wanted, seconds: [*_auto(wanted, seconds), sparrow_attempts(wanted, seconds)],
 }
-STEADY = tuple(name for name in METHODS if name != "sparrow")
-"""Methods that give the same layout every time: they read no clock."""
-
-DEFAULT_METHOD = "auto"

@@ -10,17 +10,18 @@ import numpy as np
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import LayoutError, Problem, raise_all
 from quiltcli.geometry import IntArray, segments
+from quiltcli.job.layout import PackSpec
 from quiltcli.layout.align import misfits
 from quiltcli.layout.check import check_layout
+from quiltcli.layout.file import read_layout
 from quiltcli.layout.layout import Layout, quilt_polygons
 from quiltcli.layout.packing.model import PackResult, Room, quilt_from_facet
 from quiltcli.layout.packing.rectangles.maxrects import without
-from quiltcli.layout.packing.wishes import Target
 
 _MOST_ROOMS = 64  # a page
 
 
-def all_pins(facets: Facets, target: Target) -> Layout | None:
+def all_pins(facets: Facets, wishes: PackSpec) -> Layout | None:
     """Everything that is to stay: what the layout of the pins has, and what the display file gives a place.
 
     A facet that has both stays where the layout has it.
@@ -28,8 +29,8 @@ def all_pins(facets: Facets, target: Target) -> Layout | None:
     Raises:
         LayoutError: they do not belong to the display, meet each other, or lie outside their pages.
     """
-    given = pinned(target.pins, facets) if target.pins is not None else None
-    own = _placed_by_display(facets, given, target)
+    given = pinned(read_layout(wishes.pins), facets) if wishes.pins is not None else None
+    own = _placed_by_display(facets, given, wishes)
     if own is None:
         return given if given is not None and len(given.facet) else None
     both = own if given is None or not len(given.facet) else joined(given, own)
@@ -37,7 +38,7 @@ def all_pins(facets: Facets, target: Target) -> Layout | None:
     return both
 
 
-def _placed_by_display(facets: Facets, given: Layout | None, target: Target) -> Layout | None:
+def _placed_by_display(facets: Facets, given: Layout | None, wishes: PackSpec) -> Layout | None:
     """The facets whose place the display file gives, as a layout; None when it gives none."""
     places = facets.places
     if places is None:
@@ -47,18 +48,18 @@ def _placed_by_display(facets: Facets, given: Layout | None, target: Target) -> 
     on = np.flatnonzero(free)
     if not on.size:
         return None
-    size = target.size or (given.pages[-1] if given is not None and len(given.facet) else None)
+    size = wishes.size or (given.pages[-1] if given is not None and len(given.facet) else None)
     if size is None:
         message = "a facet with a place needs a page of a given size (--size, or size under layout:)"
         raise LayoutError(places.problem(("facets", int(places.facet[on[0]])), message))
-    odd = on[(places.corner[on] % target.align > 0).any(axis=1)]
+    odd = on[(places.corner[on] % wishes.align > 0).any(axis=1)]
     raise_all(
         LayoutError,
         (
             places.problem(
                 ("facets", int(places.facet[at])),
                 f"pixel ({places.corner[at, 0]}, {places.corner[at, 1]}) is no multiple of the"
-                f" alignment to {target.align}",
+                f" alignment to {wishes.align}",
             )
             for at in odd
         ),
@@ -79,8 +80,8 @@ def _placed_by_display(facets: Facets, given: Layout | None, target: Target) -> 
         corner_start=np.concatenate(([0], np.cumsum(np.diff(facets.corner_start)[row]))),
         polygon=corner_pixels(facets)[np.isin(corner_row, row)],
         pages=np.array([*begun, *[size] * (count - len(begun))], dtype=np.int32),
-        padding=target.padding,
-        method=target.method,
+        padding=wishes.padding,
+        method=wishes.method,
         display=facets.path,
         display_sha256=facets.sha256,
         place=places,

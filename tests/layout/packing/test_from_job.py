@@ -6,8 +6,9 @@ import numpy as np
 
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
 from quiltcli.layout import layout_text, write_layout
-from quiltcli.layout.packing import layout_for, pack
+from quiltcli.layout.packing import layout_for
 from tests.helpers.flat_displays import flat_display, rectangle
+from tests.helpers.packed_layouts import pack
 
 TWO = flat_display([rectangle(4, 3)] * 2, enabled=[True, False])
 
@@ -40,6 +41,6 @@ def test_a_job_may_say_all_that_the_command_takes(tmp_path):
     _, layout = layout_for(spec, both)
     assert layout.pages.tolist() == [[16, 12]]
     assert layout.quilt_from_facet.tolist() == [[[1, 0, 0], [0, 1, 0]], [[1, 0, 0], [0, 1, 4]]]
-    assert layout_for(PackSpec(aspect=4.0, seconds=0.1), both)[1].pages.tolist() == [[16, 4]]
+    assert layout_for(PackSpec(aspect="4:1", seconds=0.1), both)[1].pages.tolist() == [[16, 4]]
     assert layout_for(PackSpec(size=(16, 12), page_facets=1), both)[1].page.tolist() == [0, 1]
     assert layout_for(PackSpec(size=(16, 12), page_pixels=12), both)[1].page.tolist() == [0, 1]

@@ -11,14 +11,14 @@ import pytest
 from quiltcli.display import corner_pixels
 from quiltcli.images.facets import facet_image, quilt_buffers
 from quiltcli.layout import Layout, check_layout, fill, layout_text, pixel_owners, quilt_polygons, whole_pixel
-from quiltcli.layout.packing import STEADY, pack
+from quiltcli.layout.packing import METHODS
 from quiltcli.layout.packing.model import used_height
 from quiltcli.layout.packing.outlines.nest import nest_attempts
 from tests.helpers.flat_displays import flat_display, random_polygons, rectangle
-from tests.helpers.packed_layouts import MODELS, collisions, model, wanted_of
+from tests.helpers.packed_layouts import MODELS, collisions, model, pack, wanted_of
 
 NAMES = sorted(path.stem for path in MODELS.glob("*.yaml"))
-WHOLE = [method for method in STEADY if method != "net"]
+WHOLE = [method for method in METHODS if method != "net"]
 
 
 def unchanged(layout: Layout) -> bool:
@@ -41,7 +41,7 @@ def test_no_facets_of_a_display_meet(name, method):
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("method", STEADY)
+@pytest.mark.parametrize("method", METHODS)
 def test_no_facets_of_any_display_meet(name, method):
     facets = model(name)
     layout = pack(facets, method)
@@ -53,7 +53,7 @@ def test_no_facets_of_any_display_meet(name, method):
     assert collisions(layout, 0 if method == "net" else 5) == 0
 
 
-@pytest.mark.parametrize("method", STEADY)
+@pytest.mark.parametrize("method", METHODS)
 def test_noise_survives_the_way_out_and_back(method):
     facets = flat_display(random_polygons(40, 6, 40, seed=9))
     layout = pack(facets, method, (70, 60), seconds=0.1, mirror=method != "net")
@@ -73,7 +73,7 @@ def test_rasters_stay_the_displays(method):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", STEADY)
+@pytest.mark.parametrize("method", METHODS)
 def test_the_same_display_gives_the_same_file(method):
     one, other = (layout_text(pack(model("teapot1024"), method)) for _ in range(2))
     assert one == other

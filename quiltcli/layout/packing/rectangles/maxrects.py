@@ -15,18 +15,7 @@ from quiltcli.layout.packing.model import (
     PackResult,
     Room,
     grown_size,
-    page_count,
-    used_height,
 )
-
-
-def pack_maxrects(wanted: PackInput) -> PackResult:
-    """The best of three orders of placing: by longer side, by shorter side, by area, largest first.
-
-    Best is fewest pages, then least height on the last page; the first order among equals.
-    """
-    results = [place_maxrects(wanted, order) for order in size_orders(wanted)]
-    return min(results, key=lambda result: (page_count(result), used_height(wanted, result)))
 
 
 def size_orders(wanted: PackInput) -> list[IntArray]:

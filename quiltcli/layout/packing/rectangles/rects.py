@@ -21,7 +21,7 @@ from quiltcli.layout.packing.model import (
     placed_size,
     used_height,
 )
-from quiltcli.layout.packing.rectangles.maxrects import pack_maxrects, place_maxrects, size_orders
+from quiltcli.layout.packing.rectangles.maxrects import place_maxrects, size_orders
 from quiltcli.layout.packing.rectangles.rows import pack_rows
 from quiltcli.layout.packing.rectangles.skyline import pack_skyline
 
@@ -39,21 +39,8 @@ def rows_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     return [Attempt(pack_rows, 3e-6 * SLOW * len(wanted.size), _area(wanted), "rows", least_width(wanted))]
 
 
-def maxrects_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
-    """Maximal rectangles in three orders, however long they take."""
-    return [
-        Attempt(
-            pack_maxrects,
-            3 * _maxrects_seconds(len(wanted.size)),
-            _area(wanted),
-            "maxrects",
-            least_width(wanted),
-        )
-    ]
-
-
 def rects_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
-    """A skyline in three orders, which is quick, then maximal rectangles in the same orders.
+    """A skyline, which is quick, then maximal rectangles in three orders.
 
     Once all rectangles stand and once all lie, since of equal panels the last row that is lower so is
     no reason to turn those of all other rows. Few are then tried in many other orders.
@@ -61,7 +48,7 @@ def rects_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     count, area, narrowest = len(wanted.size), _area(wanted), least_width(wanted)
     orders = size_orders(wanted)
     once = _skyline_seconds(count)
-    quick = [Attempt(partial(pack_skyline, order=order), once, area, "boxes", narrowest) for order in orders]
+    quick = Attempt(partial(pack_skyline, order=orders[0]), once, area, "boxes", narrowest)
     alike = [
         Attempt(partial(pack_skyline, order=orders[0], lock=lock), once, area, stance, narrowest)
         for stance, lock in zip(("standing", "lying"), _stances(wanted), strict=True)
@@ -75,7 +62,7 @@ def rects_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
         steps = int(_IMPROVING * seconds / once)
         starts = 9 + 2 * _SPLITS
         better = [Attempt(Reordered(steps).run, (steps + starts) * once, area, "boxes", narrowest)]
-    return [*quick[:1], *alike, *thorough, *quick[1:], *better]
+    return [quick, *alike, *thorough, *better]
 
 
 @dataclass(frozen=True)
