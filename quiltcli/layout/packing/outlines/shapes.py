@@ -8,6 +8,7 @@ counts as filled. A pixel is touched when the polygon reaches further than 0.01 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -38,6 +39,27 @@ class Shapes:
     left: Int32Array
     right: Int32Array
     area: IntArray
+
+    @cached_property
+    def taken(self) -> IntArray:
+        """Sum (n, O) of the left ends of a shape's rows, of those that are touched."""
+        order = np.argsort(self.start, axis=None)
+        left = np.where(self.left < NOWHERE, self.left, 0).astype(np.int64)
+        sums = np.zeros(self.start.size, dtype=np.int64)
+        sums[order] = np.add.reduceat(left, self.start.ravel()[order])
+        return sums.reshape(self.start.shape)
+
+    @cached_property
+    def first_alike(self) -> IntArray:
+        """For every shape (n,) the first one that is the same, pixel by pixel, standing and lying."""
+        first: dict[tuple[bytes, ...], int] = {}
+        looks = (
+            tuple(
+                side[self.rows(shape, turn)].tobytes() for turn in (0, 1) for side in (self.left, self.right)
+            )
+            for shape in range(len(self.size))
+        )
+        return np.array([first.setdefault(look, shape) for shape, look in enumerate(looks)])
 
     def rows(self, shape: int, orientation: int) -> slice:
         """The rows of a shape in one orientation."""

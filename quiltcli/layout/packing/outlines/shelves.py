@@ -99,8 +99,9 @@ def _room_for(strips: Strips, shapes: Shapes, shape: int, begins: int) -> tuple[
 class _Row:
     """One row while it is filled.
 
-    `_edge` holds, for every candidate, its left side on the rows of pixels it would take, so that all
-    candidates are tried on the front at once.
+    A window of shapes is looked at. Those that are alike are tried once: each kind has a block of
+    places, one for every orientation and level. `_edge` holds, for every place, the shape's left side
+    on the rows of pixels it would take, so that all places are tried on the front at once.
     """
 
     def __init__(self, wanted: PackInput, shapes: Shapes, rule: ShelfRule, width: int, height: int) -> None:
@@ -110,13 +111,16 @@ class _Row:
         self._places = shapes.size.shape[1] * rule.levels
         count = rule.window * self._places
         self._edge = np.full((count, height), NOWHERE, dtype=np.int32)
-        self._low = np.zeros(count, dtype=np.int64)  # first row of pixels of each candidate
+        self._low = np.zeros(count, dtype=np.int64)  # first row of pixels of each place
         self._tall = np.zeros(count, dtype=np.int64)  # and how many there are
         self._wide = np.full(count, NOWHERE, dtype=np.int64)
         self._taken = np.zeros(count, dtype=np.int64)  # sum of the left side, where there is one
         self._area = np.ones(count, dtype=np.int64)
-        self._slot: list[int] = [-1] * rule.window
         self._front = np.zeros(height, dtype=np.int32)
+        self._slot: list[int] = [-1] * rule.window
+        self._kind: list[int] = [-1] * rule.window  # of the shape in each block
+        self._slots: dict[int, set[int]] = {}  # where shapes of a kind are
+        self._done: set[int] = set()  # kinds that fit nowhere any more, for the front only moves on
         self._passed: list[int] = []
         self._next = 0
         self._order: list[int] = []
@@ -145,28 +149,54 @@ class _Row:
                     self._pass(slot)
                     self._refill(slot)
                 continue
-            candidate, x = best
-            slot, place = divmod(candidate, self._places)
-            y = int(self._low[candidate])
-            orientation = place // self._rule.levels
+            place, x = best
+            slot, y = self._first_slot(place), int(self._low[place])
+            orientation = place % self._places // self._rule.levels
             placed.append((self._slot[slot], orientation, x, y))
             self._advance(self._slot[slot], orientation, x, y)
+            self._take_out(slot, place // self._places)
             self._refill(slot)
         return placed
+
+    def _first_slot(self, place: int) -> int:
+        """The first slot with a shape of the kind that a place is for."""
+        return min(self._slots[self._kind[place // self._places]])
 
     def _pass(self, slot: int) -> None:
         if self._slot[slot] >= 0:
             self._passed.append(self._slot[slot])
 
+    def _take_out(self, slot: int, block: int) -> None:
+        """Empty a slot; its kind's block too, when no other slot has that kind."""
+        kind = self._kind[block]
+        self._slots[kind].discard(slot)
+        if not self._slots[kind]:
+            self._clear(block)
+
+    def _clear(self, block: int) -> None:
+        """Leave a block to another kind."""
+        del self._slots[self._kind[block]]
+        self._kind[block] = -1
+        self._wide[block * self._places : (block + 1) * self._places] = NOWHERE
+
     def _refill(self, slot: int) -> None:
-        """Put the next waiting shape into a slot, in every orientation and level that fits the row."""
-        first = slot * self._places
-        self._wide[first : first + self._places] = NOWHERE
+        """Put the next waiting shape into a slot, unless it is of a kind that fits nowhere any more."""
         if self._next == len(self._order):
             self._slot[slot] = -1
             return
         shape = self._slot[slot] = self._order[self._next]
         self._next += 1
+        kind = int(self._shapes.first_alike[shape])
+        if kind in self._slots:
+            self._slots[kind].add(slot)
+        elif kind not in self._done:
+            block = self._kind.index(-1)
+            self._kind[block] = kind
+            self._slots[kind] = {slot}
+            self._describe(shape, block * self._places)
+
+    def _describe(self, shape: int, first: int) -> None:
+        """Write down a shape's places, from `first` on: every orientation and level that fits the row."""
         self._area[first : first + self._places] = self._shapes.area[shape]
         levels = self._rule.levels
         for orientation, (wide, tall) in enumerate(self._shapes.size[shape].tolist()):
@@ -174,33 +204,48 @@ class _Row:
             if free < 0:
                 continue
             left = self._shapes.left[self._shapes.rows(shape, orientation)]
-            touched = left < NOWHERE
-            taken = int(left[touched].sum())
-            for level in range(levels if free else 1):
-                at = first + orientation * levels + level
-                low = (free * level // (levels - 1)) // self._align * self._align if level else 0
-                self._edge[at] = NOWHERE
-                self._edge[at, low : low + tall] = left
-                self._low[at], self._tall[at] = low, tall
-                self._wide[at], self._taken[at] = wide, taken
+            at = first + orientation * levels
+            lows = [0]
+            if free:
+                lows = [free * level // (levels - 1) // self._align * self._align for level in range(levels)]
+            part = slice(at, at + len(lows))
+            self._edge[part] = NOWHERE
+            for place, low in enumerate(lows, at):
+                self._edge[place, low : low + tall] = left
+            self._low[part], self._tall[part], self._wide[part] = lows, tall, wide
+            self._taken[part] = self._shapes.taken[shape, orientation]
 
     def _best(self, first: bool) -> tuple[int, int] | None:
-        """The candidate that wastes least for its size, and its x; None when nothing fits."""
-        x = (self._front - self._edge).max(axis=1).astype(np.int64)
+        """The place that wastes least for its shape's size, and its x; None when nothing fits.
+
+        Kinds that fit nowhere are done with.
+        """
+        blocks = max((block for block, kind in enumerate(self._kind) if kind >= 0), default=-1) + 1
+        if not blocks:
+            return None
+        use = slice(blocks * self._places)
+        x = (self._front - self._edge[use]).max(axis=1).astype(np.int64)
         np.maximum(x, 0, out=x)
         if self._align > 1:
             x = -(-x // self._align) * self._align
-        fits = x + self._wide <= self._width
-        if first:  # the shape the row was begun for
+        fits = x + self._wide[use] <= self._width
+        if first:  # the shape the row was begun for, whose block is the first
             fits[self._places :] = False
+        else:
+            for block in np.flatnonzero(~fits.reshape(blocks, -1).any(axis=1)).tolist():
+                if self._kind[block] >= 0:
+                    self._done.add(self._kind[block])
+                    self._clear(block)
         if not fits.any():
             return None
+        low, tall = self._low[use], self._tall[use]
         before = np.concatenate(([0], np.cumsum(self._front, dtype=np.int64)))
-        wasted = self._tall * x + self._taken - before[self._low + self._tall] + before[self._low]
-        ahead = np.maximum(x + self._wide + self._padding - int(self._front.max()), 0)
-        slack = self._rule.slack * (self._height - self._tall) * ahead
-        cost = np.where(fits, (10 * wasted + slack) / self._area, np.inf)
-        best = int(np.argmin(cost))
+        wasted = tall * x + self._taken[use] - before[low + tall] + before[low]
+        ahead = np.maximum(x + self._wide[use] + self._padding - int(self._front.max()), 0)
+        slack = self._rule.slack * (self._height - tall) * ahead
+        cost = np.where(fits, (10 * wasted + slack) / self._area[use], np.inf)
+        least = np.flatnonzero(cost == cost.min()).tolist()
+        best = min(least, key=lambda place: (self._first_slot(place), place))
         return best, int(x[best])
 
     def _advance(self, shape: int, orientation: int, x: int, y: int) -> None:
