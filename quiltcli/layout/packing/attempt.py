@@ -22,6 +22,8 @@ class Attempt:
         area: pixels the facets take at least by this way: their rectangles, or what they touch.
         family: attempts of one family do well on the same pages; the first of a family scouts.
         narrowest: least width of a page that holds each of the pieces.
+        least: pixels that facets with their padding take in any packing that lists of its kind find; 0
+            when that is not known.
     """
 
     run: Callable[[PackInput], PackResult]
@@ -29,6 +31,7 @@ class Attempt:
     area: float
     family: str
     narrowest: int
+    least: float = 0.0
 
 
 Method: TypeAlias = Callable[[PackInput, float], Sequence[Sequence[Attempt]]]

@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, next_in_row
 from quiltcli.layout.from_uv import MIRROR, QUARTER_TURNS
 from quiltcli.layout.layout import PIXEL_TOLERANCE
 
@@ -89,6 +89,14 @@ def placed_size(size: Int32Array, turn: Int32Array) -> Int32Array:
     return result
 
 
+def polygon_areas(wanted: PackInput) -> FloatArray:
+    """Pixels (n,) that the facets' polygons enclose, exactly."""
+    here, there = wanted.polygon, wanted.polygon[next_in_row(wanted.corner_start)]
+    twice = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+    result: FloatArray = np.abs(np.add.reduceat(twice, wanted.corner_start[:-1])) / 2
+    return result
+
+
 def grown_size(wanted: PackInput) -> IntArray:
     """What rasters (n, 2) take with their padding to the right and below, in whole steps of the alignment."""
     steps = -(-(wanted.size.astype(np.int64) + wanted.padding) // wanted.align)
@@ -113,6 +121,11 @@ def used_height(wanted: PackInput, result: PackResult) -> int:
 def page_count(result: PackResult) -> int:
     """Number of pages a result takes."""
     return int(result.page.max(initial=-1)) + 1
+
+
+def cost(wanted: PackInput, result: PackResult) -> tuple[int, int, int]:
+    """Pages, height of the last, and how low everything lies: the last leads to what lowers the others."""
+    return page_count(result), used_height(wanted, result), int(extents(wanted, result)[:, 1].sum())
 
 
 def quilt_from_facet(size: Int32Array, result: PackResult) -> FloatArray:

@@ -15,9 +15,10 @@ from quiltcli.geometry import Int32Array, IntArray, segments
 from quiltcli.job.layout import PACKING_METHODS, PackSpec
 from quiltcli.layout.from_uv import layout_from_polygons
 from quiltcli.layout.layout import Layout
-from quiltcli.layout.packing.methods import METHODS
+from quiltcli.layout.packing.methods import METHODS, has_all_arrangements
 from quiltcli.layout.packing.model import PackInput, PackResult, page_count, quilt_from_facet
 from quiltcli.layout.packing.pins import all_pins, free_rooms, joined
+from quiltcli.layout.packing.rectangles.few import fewest_of_few, smallest_of_few
 from quiltcli.layout.packing.search import best_page, best_pages, largest_page
 from quiltcli.layout.packing.shortage import shortage
 
@@ -72,7 +73,14 @@ def pack(facets: Facets, wishes: PackSpec | None = None) -> Layout:
 
 def _packed(wanted: PackInput, wishes: PackSpec) -> tuple[PackResult, tuple[int, int]]:
     """Places and page size."""
-    searches = METHODS[PACKING_METHODS[wishes.method]](wanted, wishes.seconds)
+    method = PACKING_METHODS[wishes.method]
+    if has_all_arrangements(method, wanted):
+        if wishes.size is not None:
+            return fewest_of_few(wanted), wishes.size
+        found = smallest_of_few(wanted, wishes.aspect)
+        if found is not None:
+            return found
+    searches = METHODS[method](wanted, wishes.seconds)
     if wishes.size is not None:
         return best_pages(searches, wanted, wishes.seconds), wishes.size
     return best_page(searches, wanted, wishes.seconds, wishes.aspect)

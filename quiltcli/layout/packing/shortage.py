@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from quiltcli.job.layout import PACKING_METHODS, PackSpec
+from quiltcli.layout.packing.bounds import LARGEST_PAGE
 from quiltcli.layout.packing.methods import METHODS
 from quiltcli.layout.packing.model import PackInput, PackResult, page_count
-from quiltcli.layout.packing.search import LARGEST_PAGE, best_pages
+from quiltcli.layout.packing.search import best_pages
 
 _SHARE = 0.2  # of the time, for each try at another density or size
 

@@ -117,7 +117,7 @@ def test_every_turn_and_mirror_is_a_copy_of_pixels(turn, mirror):
     seed=st.integers(0, 10**6), padding=st.integers(0, 3), size=st.sampled_from([None, (40, 30), (33, 64)])
 )
 def test_rectangles_never_come_nearer_than_the_padding(method, seed, padding, size):
-    layout = pack(flat_display(random_polygons(12, 4, 28, seed)), method, size, padding)
+    layout = pack(flat_display(random_polygons(12, 4, 28, seed)), method, size, padding, seconds=QUICK)
     assert closest(layout) >= padding
 
 

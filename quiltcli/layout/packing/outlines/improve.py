@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from quiltcli.layout.packing.dice import Dice
-from quiltcli.layout.packing.model import PackInput, PackResult, extents, page_count, used_height
+from quiltcli.layout.packing.model import PackInput, PackResult, cost
 from quiltcli.layout.packing.outlines.mosaic import Piece, pack_mosaic, pieces_of
 from quiltcli.layout.packing.outlines.settle import settle
 from quiltcli.layout.packing.outlines.shapes import Shapes
@@ -35,14 +35,14 @@ class Mosaic:
         order = np.lexsort((np.arange(self.shapes.area.size), -self.shapes.area)).tolist()
         locks = [-1] * len(order)
         best = pack_mosaic(wanted, self._pieces, self.cell, order, locks)
-        least = _cost(wanted, best)
+        least = cost(wanted, best)
         dice = Dice()
         for _ in range(self.steps):
             new_order, new_locks = self._changed(order, locks, dice)
             result = pack_mosaic(wanted, self._pieces, self.cell, new_order, new_locks)
-            cost = _cost(wanted, result)
-            if cost <= least:
-                best, least, order, locks = result, cost, new_order, new_locks
+            now = cost(wanted, result)
+            if now <= least:
+                best, least, order, locks = result, now, new_order, new_locks
         return settle(wanted, self.shapes, best)
 
     def _changed(self, order: list[int], locks: list[int], dice: Dice) -> tuple[list[int], list[int]]:
@@ -56,8 +56,3 @@ class Mosaic:
             else:
                 locks[i] = dice.below(orientations + 1) - 1
         return order, locks
-
-
-def _cost(wanted: PackInput, result: PackResult) -> tuple[int, int, int]:
-    """Pages, height of the last, and how low everything lies: the last leads to what lowers the others."""
-    return page_count(result), used_height(wanted, result), int(extents(wanted, result)[:, 1].sum())

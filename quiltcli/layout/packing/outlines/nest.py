@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from quiltcli.layout.packing.attempt import SLOW, Attempt, least_width
-from quiltcli.layout.packing.model import PackInput, PackResult
+from quiltcli.layout.packing.bounds import outline_area
+from quiltcli.layout.packing.model import PackInput, PackResult, polygon_areas
 from quiltcli.layout.packing.outlines.improve import Mosaic
 from quiltcli.layout.packing.outlines.pile import Pile
 from quiltcli.layout.packing.outlines.settle import settle
-from quiltcli.layout.packing.outlines.shapes import Shapes, facet_shapes
+from quiltcli.layout.packing.outlines.shapes import Shapes, all_rectangles, facet_shapes
 from quiltcli.layout.packing.outlines.shelves import ShelfRule, pack_shelves
 
 _RULES = (
@@ -36,7 +38,11 @@ _IMPROVING = 0.3  # of the time, for improving the mosaic on one page width
 
 def nest_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     """Shelves by several rules; for few facets mosaics too, improved in more steps for more time."""
-    return shape_attempts(wanted, facet_shapes(wanted), seconds)
+    boxes = wanted.size.astype(np.float64).prod(axis=1)
+    least = outline_area(wanted, boxes if all_rectangles(wanted) else polygon_areas(wanted))
+    return [
+        replace(attempt, least=least) for attempt in shape_attempts(wanted, facet_shapes(wanted), seconds)
+    ]
 
 
 def shape_attempts(wanted: PackInput, shapes: Shapes, seconds: float) -> list[Attempt]:

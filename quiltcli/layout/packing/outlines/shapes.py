@@ -67,6 +67,15 @@ class Shapes:
         return slice(start, start + int(self.size[shape, orientation, 1]))
 
 
+def all_rectangles(wanted: PackInput) -> bool:
+    """Whether every facet touches every pixel of its raster, by its rows and by its columns."""
+    shapes = facet_shapes(wanted)
+    whole = wanted.size.astype(np.int64).prod(axis=1)
+    columns = [shapes.rows(shape, 1) for shape in range(len(wanted.size))]
+    lying = [int(np.maximum(shapes.right[rows] - shapes.left[rows], 0).sum()) for rows in columns]
+    return bool((shapes.area == whole).all() and (np.array(lying) == whole).all())
+
+
 def facet_shapes(wanted: PackInput) -> Shapes:
     """Shapes of facets, in four orientations, or eight when they may be mirrored."""
     shape, _ = segments(wanted.corner_start)

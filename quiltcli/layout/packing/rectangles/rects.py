@@ -12,15 +12,7 @@ import numpy as np
 from quiltcli.geometry import IntArray
 from quiltcli.layout.packing.attempt import SLOW, Attempt, least_width
 from quiltcli.layout.packing.dice import Dice
-from quiltcli.layout.packing.model import (
-    PackInput,
-    PackResult,
-    extents,
-    grown_size,
-    page_count,
-    placed_size,
-    used_height,
-)
+from quiltcli.layout.packing.model import PackInput, PackResult, cost, grown_size, placed_size
 from quiltcli.layout.packing.rectangles.maxrects import place_maxrects, size_orders
 from quiltcli.layout.packing.rectangles.rows import pack_rows
 from quiltcli.layout.packing.rectangles.skyline import pack_skyline
@@ -36,7 +28,8 @@ _IMPROVING = 0.3  # of the time, for improving an order on one page width
 
 def rows_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     """Linear order, however long it takes."""
-    return [Attempt(pack_rows, 3e-6 * SLOW * len(wanted.size), _area(wanted), "rows", least_width(wanted))]
+    area = _area(wanted)
+    return [Attempt(pack_rows, 3e-6 * SLOW * len(wanted.size), area, "rows", least_width(wanted), area)]
 
 
 def rects_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
@@ -47,21 +40,21 @@ def rects_attempts(wanted: PackInput, seconds: float) -> list[Attempt]:
     """
     count, area, narrowest = len(wanted.size), _area(wanted), least_width(wanted)
     orders = size_orders(wanted)
-    once = _skyline_seconds(count)
-    quick = Attempt(partial(pack_skyline, order=orders[0]), once, area, "boxes", narrowest)
+    once, longer = _skyline_seconds(count), _maxrects_seconds(count)
+    quick = Attempt(partial(pack_skyline, order=orders[0]), once, area, "boxes", narrowest, area)
     alike = [
-        Attempt(partial(pack_skyline, order=orders[0], lock=lock), once, area, stance, narrowest)
+        Attempt(partial(pack_skyline, order=orders[0], lock=lock), once, area, stance, narrowest, area)
         for stance, lock in zip(("standing", "lying"), _stances(wanted), strict=True)
     ]
     thorough = [
-        Attempt(partial(place_maxrects, order=order), _maxrects_seconds(count), area, "boxes", narrowest)
+        Attempt(partial(place_maxrects, order=order), longer, area, "boxes", narrowest, area)
         for order in orders
     ]
     better = []
     if count <= _IMPROVED:
         steps = int(_IMPROVING * seconds / once)
         starts = 9 + 2 * _SPLITS
-        better = [Attempt(Reordered(steps).run, (steps + starts) * once, area, "boxes", narrowest)]
+        better = [Attempt(Reordered(steps).run, (steps + starts) * once, area, "boxes", narrowest, area)]
     return [quick, *alike, *thorough, *better]
 
 
@@ -78,7 +71,7 @@ class Reordered:
     def run(self, wanted: PackInput) -> PackResult:
         """The best of all that were tried."""
         results = [
-            (_cost(wanted, result), number, order, lock, result)
+            (cost(wanted, result), number, order, lock, result)
             for number, (order, lock, result) in enumerate(_starts(wanted))
         ]
         least, _, order, lock, best = min(results, key=lambda entry: entry[:2])
@@ -86,9 +79,9 @@ class Reordered:
         for _ in range(self.steps):
             new_order, new_lock = _changed(order, lock, dice)
             result = pack_skyline(wanted, new_order, new_lock)
-            cost = _cost(wanted, result)
-            if cost <= least:
-                best, least, order, lock = result, cost, new_order, new_lock
+            now = cost(wanted, result)
+            if now <= least:
+                best, least, order, lock = result, now, new_order, new_lock
         return best
 
 
@@ -132,11 +125,6 @@ def _changed(order: IntArray, lock: IntArray, dice: Dice) -> tuple[IntArray, Int
         else:
             lock[i] = dice.below(3) - 1
     return order, lock
-
-
-def _cost(wanted: PackInput, result: PackResult) -> tuple[int, int, int]:
-    """Pages, height of the last, and how low everything lies."""
-    return page_count(result), used_height(wanted, result), int(extents(wanted, result)[:, 1].sum())
 
 
 def _skyline_seconds(count: int) -> float:
