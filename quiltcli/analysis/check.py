@@ -16,6 +16,7 @@ from quiltcli.display import Facets, load_display
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.mesh.read import SUFFIXES
 from quiltcli.formats.yaml.source import parse_yaml
+from quiltcli.images.names import layout_path
 from quiltcli.job import (
     JobFile,
     LayoutFile,
@@ -143,7 +144,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     findings.problems += found
     facets = findings.facets(job.display)
     choice = job.layout or (load_display_file(job.display).layout if facets else None) or PackSpec()
-    findings.run(layout_for, choice, facets)
+    findings.run(layout_for, choice, facets, layout_path(job.output.directory))
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
     findings.scene(job.scene, findings.run(load_scene_file, job.scene))

@@ -41,6 +41,11 @@ def facet_path(out: Path, facet_id: int, frame: int, eye: str = "") -> Path:
     return Path(out) / "facets" / f"facet_{facet_id:04d}{_part(eye)}.{frame_digits(frame)}.exr"
 
 
+def layout_path(out: Path) -> Path:
+    """The layout that was used."""
+    return Path(out) / "layout.yaml"
+
+
 def _part(eye: str) -> str:
     return f".{eye}" if eye else ""
 

@@ -13,34 +13,52 @@ from quiltcli.formats.gltf.container import files_beside
 from quiltcli.job.dump import plain
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import PackSpec
-from quiltcli.job.load import load_display_file, load_layout_file, load_scene_file
+from quiltcli.job.layout_table import places_sha256, read_layout_table
+from quiltcli.job.load import load_display_file, load_scene_file
 from quiltcli.job.model import YAMLS
+
+_PACKING = 1  # to be raised when the same wishes come to another layout than before
 
 
 def job_sha256(job: JobFile) -> str:
     """Hash of what makes the pixels of a job's frames, hexadecimal.
 
     Files count by their contents, not by their names: a moved folder keeps its hash and an edited
-    mesh changes it. Which frames are rendered, where to, whether as quilts or facet images, and what
-    becomes of facets that are not lit, makes no difference to any pixel and is left out.
+    mesh changes it. A layout counts by how it was packed, whether the job says that or names the file
+    that came of it; a layout that was not packed, or changed since, counts by its places. Which frames
+    are rendered, where to, whether as quilts or facet images, and what becomes of facets that are not
+    lit, makes no difference to any pixel and is left out.
     """
     data = plain(job, file_sha256)
     data["display"] = plain(load_display_file(job.display), file_sha256)
     data["scene"] = plain(load_scene_file(job.scene), file_sha256)
     if isinstance(job.layout, Path):
-        data["layout"] = _places(job.layout)
-    elif isinstance(job.layout, PackSpec) and job.layout.pins is not None:
-        data["layout"]["pins"] = _places(job.layout.pins)
+        data["layout"] = _layout_sha256(job.layout)
+    elif isinstance(job.layout, PackSpec):
+        data["layout"] = wishes_sha256(job.layout)
     del data["frames"]
     data["output"] = {key: data["output"][key] for key in ("channels", "compression", "data_window")}
+    return _text_sha256(data)
+
+
+def wishes_sha256(wishes: PackSpec) -> str:
+    """Hash of how to pack, hexadecimal; facets that are to stay count by the places their file gives them."""
+    data = {**plain(wishes, str), "packing": _PACKING}
+    if wishes.pins is not None:
+        data["pins"] = places_sha256(read_layout_table(wishes.pins))
+    return _text_sha256(data)
+
+
+def _layout_sha256(path: Path) -> str:
+    """What counts of a layout file: how it was packed, or where its facets lie if that was changed since."""
+    table = read_layout_table(path)
+    packed, places = table.head.packed, places_sha256(table)
+    return packed.wishes_sha256 if packed is not None and packed.places_sha256 == places else places
+
+
+def _text_sha256(data: Any) -> str:
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _places(layout: Path) -> dict[str, Any]:
-    """What counts of a layout file: not its display, which counts already, nor the text it was found by."""
-    data = plain(load_layout_file(layout), str)
-    return {key: data[key] for key in ("pages", "facets", "padding")}
 
 
 def file_sha256(path: Path) -> str:

@@ -161,6 +161,20 @@ class PlaceSpec(Model):
     """Corners on the facet's raster, pixels."""
 
 
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class PackedSpec(Model):
+    """What a layout was packed from, so that it need not be packed again while that is the same."""
+
+    wishes_sha256: Sha256
+    """Hash of how to pack."""
+    facets_sha256: Sha256
+    """Hash of which of the display's facets are enabled, and of places that its file gives."""
+    places_sha256: Sha256
+    """Hash of the places that were found; others in the file were changed since."""
+
+
 class LayoutFile(FileModel):
     """Where each facet's pixels lie in the quilt."""
 
@@ -170,7 +184,7 @@ class LayoutFile(FileModel):
     """Version of the format."""
     display: AnyPath | None = None
     """The display file the layout was made for."""
-    display_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
+    display_sha256: Sha256 | None = None
     """Hash of that display's geometry."""
     method: str = "manual"
     """Packing method it was made by."""
@@ -180,6 +194,8 @@ class LayoutFile(FileModel):
     """Pages of the quilt."""
     facets: Annotated[tuple[PlaceSpec, ...], Listed, Field(min_length=1)]
     """Places of the facets."""
+    packed: PackedSpec | None = None
+    """What it was packed from; absent when it was not packed."""
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Ids are unique, pages exist, no map flattens its facet."""

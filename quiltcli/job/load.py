@@ -38,7 +38,12 @@ def load_layout_file(path: Path | str) -> LayoutFile:
     Raises:
         JobError: with every problem of the file.
     """
-    return _load(LayoutFile, parse_yaml(path))
+    return layout_of(parse_yaml(path))
+
+
+def layout_of(found: YamlFile) -> LayoutFile:
+    """As `load_layout_file`, of what has been parsed."""
+    return _load(LayoutFile, found)
 
 
 def load_scene_file(path: Path | str) -> SceneFile:

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from quiltcli.formats.whole import write_text
-from quiltcli.geometry import Int32Array
+from quiltcli.geometry import segments
+from quiltcli.job.layout_table import LayoutTable, read_layout_table
 from quiltcli.layout.check import check_layout
-from quiltcli.layout.layout import Layout
-
-if TYPE_CHECKING:
-    from quiltcli.job import LayoutFile
+from quiltcli.layout.layout import Layout, Packed
 
 
 def read_layout(path: str | Path) -> Layout:
@@ -26,41 +24,37 @@ def read_layout(path: str | Path) -> Layout:
         JobError: the YAML is broken or a key is wrong, all problems together.
         LayoutError: the layout makes no sense: `check_layout` says what is looked at.
     """
-    from quiltcli.job import load_layout_file
-
-    layout = layout_from_file(load_layout_file(Path(path)))
+    layout = layout_from_table(read_layout_table(path))
     check_layout(layout)
     return layout
 
 
-def layout_from_file(spec: LayoutFile) -> Layout:
-    """The record of a validated layout file, facets sorted by id."""
-    order = sorted(range(len(spec.facets)), key=lambda row: (spec.facets[row].id, row))
-    facets = [spec.facets[row] for row in order]
-    corners = [corner for facet in facets for corner in facet.polygon]
+def layout_from_table(table: LayoutTable) -> Layout:
+    """The record of a layout file, facets sorted by id."""
+    head = table.head
+    order = np.argsort(table.facet, kind="stable")
+    counts = np.diff(table.corner_start)[order]
+    row, rank = segments(np.concatenate(([0], np.cumsum(counts))))
     return Layout(
-        facet=_whole(facet.id for facet in facets),
-        page=_whole(facet.page - 1 for facet in facets),
-        size=_whole(facet.size for facet in facets),
-        quilt_from_facet=np.array([facet.quilt_from_facet for facet in facets], dtype=np.float64),
-        origin=np.array([facet.origin for facet in facets], dtype=np.float64),
-        du=np.array([facet.du for facet in facets], dtype=np.float64),
-        dv=np.array([facet.dv for facet in facets], dtype=np.float64),
-        corner_start=np.cumsum([0, *(len(facet.polygon) for facet in facets)]),
-        polygon=np.array(corners, dtype=np.float64),
-        pages=_whole(page.size for page in spec.pages),
-        padding=spec.padding,
-        method=spec.method,
-        display=os.path.normpath(spec.display) if spec.display else "",
-        display_sha256=spec.display_sha256 or "",
-        path=str(spec.source.path),
-        place=spec.source,
-        file_row=np.array(order, dtype=np.int64),
+        facet=table.facet[order],
+        page=table.page[order],
+        size=table.size[order],
+        quilt_from_facet=table.quilt_from_facet[order],
+        origin=table.origin[order],
+        du=table.du[order],
+        dv=table.dv[order],
+        corner_start=np.concatenate(([0], np.cumsum(counts))),
+        polygon=table.polygon[table.corner_start[order][row] + rank],
+        pages=table.pages,
+        padding=table.padding,
+        method=head.method,
+        display=os.path.normpath(head.display) if head.display else "",
+        display_sha256=head.display_sha256 or "",
+        packed=None if head.packed is None else Packed(**head.packed.model_dump()),
+        path=str(table.source.path),
+        place=table.source,
+        file_row=order,
     )
-
-
-def _whole(values: Iterable[object]) -> Int32Array:
-    return np.array(list(values), dtype=np.int32)
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:
@@ -91,6 +85,7 @@ def layout_text(layout: Layout, folder: str | Path = ".") -> str:
     ]
     for row in np.flatnonzero(layout.page >= 0):
         lines += _facet_lines(layout, int(row))
+    lines += _packed_lines(layout)
     return "\n".join(lines) + "\n"
 
 
@@ -100,6 +95,13 @@ def _display_lines(layout: Layout, folder: str | Path) -> Iterator[str]:
         yield f"display: {json.dumps(display, ensure_ascii=False)}"
     if layout.display_sha256:
         yield f"display_sha256: {layout.display_sha256}"
+
+
+def _packed_lines(layout: Layout) -> Iterator[str]:
+    if layout.packed is not None:
+        yield "packed:"
+        for field in fields(layout.packed):
+            yield f"  {field.name}: {getattr(layout.packed, field.name)}"
 
 
 def _facet_lines(layout: Layout, row: int) -> list[str]:

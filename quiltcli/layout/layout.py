@@ -22,6 +22,15 @@ class Place(Protocol):
         """A problem with file, line, column and key filled in."""
 
 
+@dataclass(frozen=True)
+class Packed:
+    """What a layout was packed from, by hashes; see `PackedSpec`."""
+
+    wishes_sha256: str
+    facets_sha256: str
+    places_sha256: str
+
+
 @dataclass(frozen=True, eq=False)
 class Layout:
     """Places of F facets on the pages of a quilt.
@@ -44,6 +53,7 @@ class Layout:
         method: name of the packing method, `manual` when made by hand.
         display: the display file the layout was made for.
         display_sha256: hash of that display's geometry.
+        packed: what it was packed from, None when it was not packed.
         path: the layout file it was read from, empty when it was made by the program.
         place: finds lines in that file, None when it was made by the program.
         file_row: (F,) row of each facet in the file, None when it was made by the program.
@@ -63,6 +73,7 @@ class Layout:
     method: str
     display: str
     display_sha256: str
+    packed: Packed | None = None
     path: str = ""
     place: Place | None = field(default=None, repr=False)
     file_row: IntArray | None = field(default=None, repr=False)

@@ -18,9 +18,9 @@ from quiltcli.formats.whole import link_whole, make_folder, remove_file, write_t
 from quiltcli.geometry import BoolArray, IntArray, facet_from_world
 from quiltcli.images.facets import facet_image, page_of
 from quiltcli.images.metadata import facet_attributes, is_complete, page_attributes, viewer_attributes
-from quiltcli.images.names import facet_path, quilt_path
+from quiltcli.images.names import facet_path, layout_path, quilt_path
 from quiltcli.images.window import cropped, frame_size, tight_window, whole_frame
-from quiltcli.job import dump_job
+from quiltcli.job import PackSpec, dump_job
 from quiltcli.layout import Layout, write_layout
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.report import Clock
@@ -102,8 +102,12 @@ def write_settings(stage: Stage, out: Outputs) -> None:
     for name, wanted in (("quilt", stage.job.output.quilts), ("facets", stage.job.output.facets)):
         if wanted:
             make_folder(out.folder / name)
-    write_layout(stage.layout, out.folder / "layout.yaml")
-    write_text(out.folder / "job.yaml", dump_job(stage.job, out.folder))
+    path, job = layout_path(out.folder), stage.job
+    write_layout(stage.layout, path)
+    if isinstance(job.layout, PackSpec):
+        # Whoever takes the job up from here has the layout, and need not pack again.
+        job = job.model_copy(update={"layout": path})
+    write_text(out.folder / "job.yaml", dump_job(job, out.folder))
 
 
 @dataclass(frozen=True)

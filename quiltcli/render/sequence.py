@@ -138,7 +138,7 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
     """
     frames = list(job.frames if options.frames is None else options.frames)
     views_of(job, frames)  # what is wrong with the path is said before anything is loaded
-    stage = set_stage(job)
+    stage = set_stage(job, options.folder)
     views = stage.views(frames)
     viewers = [viewer for view in views for viewer in view.viewers]
     raise_all(ViewerError, eye_problems(stage.facets, viewers, job))

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from quiltcli.display import Facets, load_display
 from quiltcli.geometry import OwnerArray
+from quiltcli.images.names import layout_path
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.packing import layout_for
@@ -62,13 +64,18 @@ class Stage:
         return self if scene is self.scene else replace(self, scene=scene)
 
 
-def set_stage(job: JobFile) -> Stage:
+def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     """Load everything a job names and prepare what all of its frames share.
+
+    Args:
+        job: the job.
+        folder: output folder instead of the job's; the layout of an earlier run is kept there.
 
     Raises:
         QuiltError: a file is wrong, or the layout does not belong to the display.
     """
-    facets, layout = layout_for(job.layout or PackSpec(), load_display(load_display_file(job.display)))
+    kept = layout_path(folder or job.output.directory)
+    facets, layout = layout_for(job.layout or PackSpec(), load_display(load_display_file(job.display)), kept)
     return stage_of(job, facets, layout, load_scene(load_scene_file(job.scene)), job.render.bleed)
 
 

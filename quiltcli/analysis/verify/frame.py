@@ -146,7 +146,7 @@ def verify(job: JobFile, options: VerifyOptions | None = None) -> Iterator[Verif
     options = options or VerifyOptions()
     frame = job.frames[0] if options.frame is None else options.frame
     wanted = _wanted_eyes(job, views_of(job, [frame]), options.eye)  # before anything is loaded
-    stage = set_stage(job)
+    stage = set_stage(job, options.folder)
     views = [view for view in stage.views([frame]) if view.eye in wanted]
     viewers = [viewer for view in views for viewer in view.viewers]
     raise_all(ViewerError, eye_problems(stage.facets, viewers, job))

@@ -15,10 +15,11 @@ from quiltcli.exchange.pixelmaps.placing import adopted, panel, placed_rows
 from quiltcli.formats.whole import write_text
 from quiltcli.formats.yaml.source import Source, parse_yaml
 from quiltcli.job import LayoutFile
+from quiltcli.job.layout_table import table_of
 from quiltcli.job.messages import problems_of
 from quiltcli.job.model import attach
 from quiltcli.layout import Layout, quilt_polygons, whole_pixel
-from quiltcli.layout.file import layout_from_file
+from quiltcli.layout.file import layout_from_table
 
 DERIVED = ("name", "x", "y", "width", "height", "rotation", "mirror", "quilt_polygon")
 """Keys of a facet that repeat what others say; they are not read."""
@@ -71,7 +72,7 @@ def _entries(layout: Layout, facets: Facets | None) -> list[dict[str, Any]]:
 
 def read_json(path: Path, display: Facets | None, size: tuple[int, int] | None) -> Layout:
     """Read what `write_json` wrote; `size` says nothing new, for the pages have theirs."""
-    layout = layout_from_file(_model(path, _data(path)))
+    layout = layout_from_table(table_of(_model(path, _data(path))))
     return adopted(layout, display, path)
 
 

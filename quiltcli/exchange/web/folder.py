@@ -47,10 +47,7 @@ def open_folder(path: Path) -> Folder:
         wrong = f"{what} (expected the folder that quilt render has written to)"
         raise OutputError(Problem(wrong, file=str(path)))
     job = load_job(path / "job.yaml")
-    # The layout that was used, rather than the way to it: packing again takes its time.
-    used = path / "layout.yaml"
-    known = job.model_copy(update={"layout": used}) if used.is_file() else job
-    stage = set_stage(with_channels(known, ("rgba",)))
+    stage = set_stage(with_channels(job, ("rgba",)))
     frames = tuple(sorted({found.frame for found in map(name_of, _images(path)) if found}))
     if not frames:
         raise OutputError(Problem("has no images of frames (run quilt render first)", file=str(path)))

@@ -110,8 +110,12 @@ def parse_yaml(path: Path | str) -> YamlFile:
     Raises:
         JobError: nothing useful can be read from the file.
     """
-    path = Path(path)
-    root = compose(read_text(path), path)
+    return parse_text(read_text(Path(path)), Path(path))
+
+
+def parse_text(text: str, path: Path) -> YamlFile:
+    """As `parse_yaml`, of text that stands in a file of this name (JobError)."""
+    root = compose(text, path)
     if root is None:
         raise JobError(Problem("the file is empty (expected 'key: value' lines)", str(path)))
     if not isinstance(root, yaml.MappingNode):

@@ -5,13 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 from quiltcli.display import Facets
+from quiltcli.errors import QuiltError
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
+from quiltcli.job.layout_table import places_sha256
 from quiltcli.layout import Layout, align, layout_from_uv, read_layout
-from quiltcli.layout.packing.pack import pack
+from quiltcli.layout.packing.pack import pack, packed_from
 
 
-def layout_for(choice: Path | PackSpec | UvLayoutSpec, facets: Facets) -> tuple[Facets, Layout]:
+def layout_for(
+    choice: Path | PackSpec | UvLayoutSpec, facets: Facets, kept: Path | None = None
+) -> tuple[Facets, Layout]:
     """Read, pack or take from texture coordinates the layout a job asks for, and align the display with it.
+
+    Args:
+        choice: what the job says.
+        facets: the display.
+        kept: the layout file of an earlier run, if there was one. It is read instead of packing when it
+            is what packing these facets so came to, and was not changed since.
 
     Returns:
         facets and layout as `quiltcli.layout.align` gives them: one row per facet of the display.
@@ -20,9 +30,22 @@ def layout_for(choice: Path | PackSpec | UvLayoutSpec, facets: Facets) -> tuple[
         JobError, LayoutError: as `read_layout`, `pack`, `layout_from_uv` and `align` do.
     """
     if isinstance(choice, PackSpec):
-        layout = pack(facets, choice)
+        layout = _kept(kept, choice, facets) or pack(facets, choice)
     elif isinstance(choice, UvLayoutSpec):
         layout = layout_from_uv(facets, choice.size)
     else:
         layout = read_layout(choice)
     return align(layout, facets)
+
+
+def _kept(path: Path | None, wishes: PackSpec, facets: Facets) -> Layout | None:
+    """The layout of an earlier run, if nothing it came of has changed."""
+    if path is None or not path.is_file():
+        return None
+    try:
+        layout = read_layout(path)
+    except QuiltError:  # what an earlier run left is no reason not to run again
+        return None
+    same = layout.display_sha256 == facets.sha256
+    same = same and layout.packed == packed_from(facets, wishes, places_sha256(layout))
+    return layout if same else None
