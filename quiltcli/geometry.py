@@ -86,6 +86,28 @@ def facet_from_world(origin: FloatArray, du: FloatArray, dv: FloatArray) -> Floa
     return maps
 
 
+def hull(points: FloatArray) -> IntArray:
+    """Corners of the convex hull of points (n, 2), as indices, turning from x to y; collinear ones are none.
+
+    Andrew's monotone chain (1979).
+    """
+    order = np.lexsort((points[:, 1], points[:, 0])).tolist()
+    x, y = points.T.tolist()
+
+    def chain(sequence: list[int]) -> list[int]:
+        found: list[int] = []
+        for c in sequence:
+            while len(found) > 1:
+                a, b = found[-2:]
+                if (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a]) > 0:
+                    break
+                found.pop()
+            found.append(c)
+        return found[:-1]
+
+    return np.array(chain(order) + chain(order[::-1]) or order[:1])
+
+
 def gather_corners(vertices: FloatArray, triangles: Int32Array) -> FloatArray:
     """Corners (3, 3, N) [corner, axis] of `triangles` (N, 3), contiguous along N."""
     rows = vertices.take(triangles.T.ravel(), axis=0).reshape(3, -1, 3)

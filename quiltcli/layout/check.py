@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import FloatArray, Int32Array
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, cross, dot, segments
 from quiltcli.layout.layout import (
     PIXEL_TOLERANCE,
     Layout,
@@ -49,10 +49,12 @@ def _bad_pages(layout: Layout) -> Iterator[Problem]:
 
 
 def _bad_ids(layout: Layout) -> Iterator[Problem]:
-    for row, facet in enumerate(layout.facet):
+    before = np.concatenate(([0], layout.facet[:-1]))
+    for row in np.flatnonzero((layout.facet < 1) | (layout.facet == before)).tolist():
+        facet = layout.facet[row]
         if facet < 1:
             yield layout.problem(f"facet id {facet}; ids count from 1", row, "id")
-        elif row and facet == layout.facet[row - 1]:
+        else:
             yield layout.problem(f"facet {facet} is placed twice; an id may occur once", row, "id")
 
 
@@ -64,53 +66,70 @@ def _bad_page_numbers(layout: Layout) -> Iterator[Problem]:
 
 
 def _bad_numbers(layout: Layout) -> Iterator[Problem]:
-    for row, facet in enumerate(layout.facet):
-        width, height = layout.size[row]
-        if width < 1 or height < 1:
-            yield layout.problem(
-                f"facet {facet} is {width}×{height} pixels; both must be at least 1", row, "size"
-            )
-        for key in _NUMBERS:
-            if not np.isfinite(getattr(layout, key)[row]).all():
-                yield layout.problem(f"facet {facet} has numbers in {key} that are not finite", row, key)
-        corners = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
-        if len(corners) < 3:
-            message = f"facet {facet} has {len(corners)} corners; a polygon has at least 3"
-            yield layout.problem(message, row, "polygon")
-        if not np.isfinite(corners).all():
-            yield layout.problem(f"facet {facet} has corners that are not finite", row, "polygon")
-        yield from _singular(layout, row)
-
-
-def _singular(layout: Layout, row: int) -> Iterator[Problem]:
-    linear = layout.quilt_from_facet[row, :, :2]
-    area = abs(linear[0, 0] * linear[1, 1] - linear[0, 1] * linear[1, 0])
-    if area <= 1e-12 * (linear * linear).sum():
+    """Rows with numbers that make no sense; most layouts have none, so all rows are looked at at once."""
+    if layout.facet.size == 0:
+        return
+    counts = np.diff(layout.corner_start)
+    odd = (layout.size < 1).any(axis=1) | (counts < 3)
+    for key in _NUMBERS:
+        odd |= ~np.isfinite(getattr(layout, key)).reshape(len(odd), -1).all(axis=1)
+    corner_row, _ = segments(layout.corner_start)
+    odd[corner_row[~np.isfinite(layout.polygon).all(axis=1)]] = True
+    with np.errstate(invalid="ignore", over="ignore"):  # of numbers that are not finite
+        squeezed, area = _squeezed(layout)
+        flat = _flat(layout)
+    for row in np.flatnonzero(odd | squeezed | flat).tolist():
+        yield from _bad_row(layout, row)
         facet, key = layout.facet[row], "quilt_from_facet"
-        message = f"facet {facet} is squeezed to a line; the determinant of {key} is {area:g}"
-        yield layout.problem(message, row, key)
-    raster = np.stack((layout.du[row], layout.dv[row]))
-    area = float(np.linalg.norm(np.cross(raster[0], raster[1])))
-    if area <= 1e-12 * (raster * raster).sum():
+        if squeezed[row]:
+            message = f"facet {facet} is squeezed to a line; the determinant of {key} is {area[row]:g}"
+            yield layout.problem(message, row, key)
+        if flat[row]:
+            yield layout.problem(f"facet {facet} has no area in the world: du and dv are parallel", row, "du")
+
+
+def _bad_row(layout: Layout, row: int) -> Iterator[Problem]:
+    facet, (width, height) = layout.facet[row], layout.size[row]
+    if width < 1 or height < 1:
         yield layout.problem(
-            f"facet {layout.facet[row]} has no area in the world: du and dv are parallel", row, "du"
+            f"facet {facet} is {width}×{height} pixels; both must be at least 1", row, "size"
         )
+    for key in _NUMBERS:
+        if not np.isfinite(getattr(layout, key)[row]).all():
+            yield layout.problem(f"facet {facet} has numbers in {key} that are not finite", row, key)
+    corners = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    if len(corners) < 3:
+        message = f"facet {facet} has {len(corners)} corners; a polygon has at least 3"
+        yield layout.problem(message, row, "polygon")
+    if not np.isfinite(corners).all():
+        yield layout.problem(f"facet {facet} has corners that are not finite", row, "polygon")
+
+
+def _squeezed(layout: Layout) -> tuple[BoolArray, FloatArray]:
+    """Facets (F,) whose map makes a line of them, and the area (F,) it makes of a pixel."""
+    linear = layout.quilt_from_facet[:, :, :2]
+    area = np.abs(linear[:, 0, 0] * linear[:, 1, 1] - linear[:, 0, 1] * linear[:, 1, 0])
+    return area <= 1e-12 * (linear * linear).sum(axis=(1, 2)), area
+
+
+def _flat(layout: Layout) -> BoolArray:
+    """Facets (F,) without an area in the world."""
+    normal = cross(layout.du, layout.dv)
+    length2 = dot(layout.du, layout.du) + dot(layout.dv, layout.dv)
+    return np.asarray(np.sqrt(dot(normal, normal)) <= 1e-12 * length2)
 
 
 def _outside_raster(layout: Layout) -> Iterator[Problem]:
     """Corners of a polygon outside its own W × H raster."""
-    for row, facet in enumerate(layout.facet):
-        corners = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
-        outside = _first_outside(corners, layout.size[row])
-        if outside >= 0:
-            x, y = corners[outside]
-            width, height = layout.size[row]
-            yield layout.problem(
-                f"facet {facet}: corner {outside + 1} at ({x:.6g}, {y:.6g}) lies outside"
-                f" its raster of {width}×{height} pixels",
-                row,
-                "polygon",
-            )
+    row_of, _ = segments(layout.corner_start)
+    for row, corner, (x, y) in _first_outside(layout, layout.polygon, layout.size[row_of]):
+        width, height = layout.size[row]
+        yield layout.problem(
+            f"facet {layout.facet[row]}: corner {corner + 1} at ({x:.6g}, {y:.6g}) lies outside"
+            f" its raster of {width}×{height} pixels",
+            row,
+            "polygon",
+        )
 
 
 def _outside_page(layout: Layout) -> Iterator[Problem]:
@@ -118,30 +137,35 @@ def _outside_page(layout: Layout) -> Iterator[Problem]:
 
     A facet that is copied pixel by pixel must have its whole raster on the page, another only its polygon.
     """
-    quilt = quilt_polygons(layout)
-    copied = whole_pixel(layout) & ~facet_pixels_inside_page(layout)
-    for row, facet in enumerate(layout.facet):
-        if layout.page[row] < 0:
-            continue
+    row_of, _ = segments(layout.corner_start)
+    on = layout.page >= 0
+    sizes = np.where(on[row_of, None], layout.pages[layout.page[row_of]], np.iinfo(np.int32).max)
+    quilt = np.where(on[row_of, None], quilt_polygons(layout), 0.0)
+    outside = {row: (corner, at) for row, corner, at in _first_outside(layout, quilt, sizes)}
+    copied = on & whole_pixel(layout) & ~facet_pixels_inside_page(layout)
+    for row in sorted({*outside, *np.flatnonzero(copied).tolist()}):
         page = int(layout.page[row])
         width, height = layout.pages[page]
-        corners = quilt[layout.corner_start[row] : layout.corner_start[row + 1]]
-        outside = _first_outside(corners, layout.pages[page])
-        if outside >= 0:
-            x, y = corners[outside]
+        message = f"facet {layout.facet[row]}: its raster reaches outside page {page + 1}"
+        if row in outside:
+            corner, (x, y) = outside[row]
             message = (
-                f"facet {facet}: corner {outside + 1} at ({x:.6g}, {y:.6g}) lies outside page {page + 1}"
+                f"facet {layout.facet[row]}: corner {corner + 1} at ({x:.6g}, {y:.6g}) lies outside"
+                f" page {page + 1}"
             )
-        elif copied[row]:
-            message = f"facet {facet}: its raster reaches outside page {page + 1}"
-        else:
-            continue
         yield layout.problem(f"{message} of {width}×{height} pixels", row, "quilt_from_facet")
 
 
-def _first_outside(corners: FloatArray, size: Int32Array) -> int:
+def _first_outside(
+    layout: Layout, corners: FloatArray, size: Int32Array
+) -> Iterator[tuple[int, int, tuple[float, float]]]:
+    """Rows with corners (C, 2) outside a size (C, 2): the row, its first such corner, and where that is."""
+    row_of, rank = segments(layout.corner_start)
     outside = ((corners < -PIXEL_TOLERANCE) | (corners > size + PIXEL_TOLERANCE)).any(axis=1)
-    return int(np.argmax(outside)) if outside.any() else -1
+    at = np.flatnonzero(outside)
+    for first in at[np.diff(row_of[at], prepend=-1) > 0].tolist():
+        x, y = corners[first].tolist()
+        yield int(row_of[first]), int(rank[first]), (x, y)
 
 
 def _overlapping(layout: Layout) -> Iterator[Problem]:

@@ -103,7 +103,8 @@ def write_settings(stage: Stage, out: Outputs) -> None:
         if wanted:
             make_folder(out.folder / name)
     path, job = layout_path(out.folder), stage.job
-    write_layout(stage.layout, path)
+    if Path(stage.layout.path) != path:  # else it was read from there
+        write_layout(stage.layout, path)
     if isinstance(job.layout, PackSpec):
         # Whoever takes the job up from here has the layout, and need not pack again.
         job = job.model_copy(update={"layout": path})

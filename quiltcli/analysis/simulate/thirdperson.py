@@ -30,6 +30,7 @@ from quiltcli.geometry import (
     Int32Array,
     cross,
     dot,
+    hull,
     normalized,
     segments,
 )
@@ -107,8 +108,8 @@ def outline_points(viewer: Viewer, facets: Facets, lit: BoolArray, most: int = R
     if slope.min() > 0.05:
         side = normalized(cross(ahead, np.eye(3)[int(np.argmin(np.abs(ahead)))]))
         flat = np.stack((dot(way, side), dot(way, cross(ahead, side))), axis=1) / slope[:, None]
-        hull = _hull(flat)
-        corners, way, slope = corners[hull], way[hull], slope[hull]
+        outline = hull(flat)
+        corners, way, slope = corners[outline], way[outline], slope[outline]
     chosen = [int(np.argmin(slope))]
     while len(chosen) < min(most, len(corners)):
         apart = (1 - way @ way[chosen].T).min(axis=1)
@@ -116,24 +117,6 @@ def outline_points(viewer: Viewer, facets: Facets, lit: BoolArray, most: int = R
             break
         chosen.append(int(np.argmax(apart)))
     return np.asarray(corners[chosen])
-
-
-def _hull(points: FloatArray) -> list[int]:
-    """Indices of the convex hull's corners (Andrew's monotone chain)."""
-    order = np.lexsort(points.T[::-1]).tolist()
-    chains = []
-    for run in (order, order[::-1]):
-        chain: list[int] = []
-        for i in run:
-            while len(chain) > 1 and _left(*points[[*chain[-2:], i]]) <= 0:
-                chain.pop()
-            chain.append(i)
-        chains += chain[:-1]
-    return chains or order[:1]
-
-
-def _left(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def viewer_marks(viewer: Viewer, points: FloatArray, radius: float, half: float) -> Marks:

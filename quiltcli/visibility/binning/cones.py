@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from quiltcli.display import Facets, convex_parts
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot, hull
 from quiltcli.layout import Layout
 from quiltcli.visibility.binning.broad import ConeGrids
 
@@ -78,17 +78,15 @@ def facet_parts(facets: Facets, layout: Layout, bleed: int) -> Parts:
     placed = np.flatnonzero(layout.page[facet] >= 0)
     facet = facet[placed]
     polygons = [facets.corners[corners[start[k] : start[k + 1]]] for k in placed.tolist()]
-    wide = [
-        _grow(
-            polygon,
-            facets.du[f],
-            facets.dv[f],
-            facets.origin[f],
-            layout.quilt_from_facet[f, :, :2],
-            bleed + 1.0,
-        )
-        for polygon, f in zip(polygons, facet.tolist(), strict=True)
-    ]
+    basis = np.stack((facets.du, facets.dv), axis=2) @ np.linalg.inv(layout.quilt_from_facet[:, :, :2])
+    wide = list(polygons)
+    counts = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
+    for count in np.unique(counts).tolist():
+        alike = np.flatnonzero(counts == count).tolist()
+        some = np.stack([polygons[k] for k in alike])
+        grown = _grow(some, basis[facet[alike]], facets.origin[facet[alike]], bleed + 1.0)
+        for k, polygon in zip(alike, grown, strict=True):
+            wide[k] = polygon
     return Parts(facet.astype(np.int32), _padded(polygons), _padded(wide))
 
 
@@ -110,47 +108,37 @@ def cone_planes(corners: FloatArray) -> FloatArray:
     return result
 
 
-def _grow(
-    polygon: FloatArray, du: FloatArray, dv: FloatArray, origin: FloatArray, linear: FloatArray, margin: float
-) -> FloatArray:
-    """A convex polygon (m, 3) that contains `polygon` (n, 3) and all within `margin` quilt pixels.
+def _grow(polygons: FloatArray, basis: FloatArray, origin: FloatArray, margin: float) -> list[FloatArray]:
+    """Convex polygons (m, 3) that contain others, and all within `margin` quilt pixels of them.
 
-    The edges are moved outward; where that would make a long spike, the polygon is widened by a
+    The edges are moved outward; where that would make a long spike, a polygon is widened by a
     square of twice the margin instead. Both hold at least what is asked for.
+
+    Args:
+        polygons: (K, n, 3) convex polygons of as many corners each.
+        basis: (K, 3, 2) world steps to the next quilt pixel right and down.
+        origin: (K, 3) a point of each polygon's plane.
+        margin: quilt pixels.
     """
-    basis = np.stack((du, dv), axis=1) @ np.linalg.inv(linear)
-    pixels = (polygon - origin) @ np.linalg.pinv(basis).T
-    ahead = np.roll(pixels, -1, axis=0) - pixels
-    area = (pixels[:, 0] * np.roll(pixels[:, 1], -1) - pixels[:, 1] * np.roll(pixels[:, 0], -1)).sum()
-    ahead /= np.sqrt((ahead * ahead).sum(axis=1))[:, None]
-    outward = np.stack((ahead[:, 1], -ahead[:, 0]), axis=1) * np.sign(area)
-    before = np.roll(outward, 1, axis=0)
-    cosine = (outward * before).sum(axis=1)
-    if (cosine > 2.0 / _LONGEST_MITRE**2 - 1.0).all():
-        grown = pixels + margin * (outward + before) / (1.0 + cosine)[:, None]
-    else:
-        square = margin * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-        grown = _hull((pixels[:, None, :] + square).reshape(-1, 2))
-    result: FloatArray = grown @ basis.T + origin
-    return result
+    pixels = (polygons - origin[:, None]) @ np.linalg.pinv(basis).transpose(0, 2, 1)
+    x, y = pixels[..., 0], pixels[..., 1]
+    area = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
+    ahead = np.roll(pixels, -1, axis=1) - pixels
+    ahead /= np.sqrt((ahead * ahead).sum(axis=2))[..., None]
+    outward = np.stack((ahead[..., 1], -ahead[..., 0]), axis=2) * np.sign(area)[:, None, None]
+    before = np.roll(outward, 1, axis=1)
+    cosine = (outward * before).sum(axis=2)
+    blunt = (cosine > 2.0 / _LONGEST_MITRE**2 - 1.0).all(axis=1)
+    moved = pixels + margin * (outward + before) / np.where(blunt[:, None], 1.0 + cosine, 1.0)[..., None]
+    square = margin * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    grown = [moved[k] if blunt[k] else _around(pixels[k][:, None] + square) for k in range(len(polygons))]
+    return [flat @ basis[k].T + origin[k] for k, flat in enumerate(grown)]
 
 
-def _hull(points: FloatArray) -> FloatArray:
-    """Convex hull of points (n, 2), anticlockwise (Andrew's monotone chain)."""
-    ordered = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
-
-    def chain(sequence: list[list[float]]) -> list[list[float]]:
-        hull: list[list[float]] = []
-        for x, y in sequence:
-            while len(hull) > 1:
-                (ax, ay), (bx, by) = hull[-2:]
-                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
-                    break
-                hull.pop()
-            hull.append([x, y])
-        return hull[:-1]
-
-    return np.array(chain(ordered) + chain(ordered[::-1]))
+def _around(points: FloatArray) -> FloatArray:
+    """The convex polygon (m, 2) around points (..., 2)."""
+    flat = points.reshape(-1, 2)
+    return flat[hull(flat)]
 
 
 def _padded(polygons: list[FloatArray]) -> FloatArray:
