@@ -104,15 +104,18 @@ def _candidates(
     edge, rank = segments(np.concatenate(([0], np.cumsum((bottom - top).astype(np.int64)))))
     y: FloatArray = top[edge] + rank
     left, right = _reach(a[edge], b[edge], y + 0.5, bleed, page[edge, 0])
-    line, rank = segments(np.concatenate(([0], np.cumsum((right - left).astype(np.int64)))))
-    edge, x, y = edge[line], left[line] + rank, y[line]
-    address = edges.address[batch][edge] + (y * page[edge, 0] + x).astype(np.int64)
-    free = owners[address] == 0
-    edge, address = edge[free], address[free]
-    centre = np.stack((x[free] + 0.5, y[free] + 0.5), axis=1)
-    distance2 = _distance2(centre, a[edge], b[edge])
-    near = distance2 <= bleed * bleed
-    return address[near], distance2[near], edges.facet[batch][edge[near]]
+    counts = (right - left).astype(np.int64)
+    begin = edges.address[batch][edge] + (y * page[edge, 0] + left).astype(np.int64)
+    # Addresses run on within a line of pixels; most of them are owned, and done with before anything else.
+    address = np.arange(int(counts.sum())) + np.repeat(begin - np.cumsum(counts) + counts, counts)
+    free = np.flatnonzero(owners.take(address) == 0)
+    address = address.take(free)
+    line = np.repeat(np.arange(counts.size), counts).take(free)
+    x = left.take(line) + (address - begin.take(line)) + 0.5
+    edge, y = edge.take(line), y.take(line) + 0.5
+    distance2 = _distance2(x, y, a, b - a, edge)
+    near = np.flatnonzero(distance2 <= bleed * bleed)
+    return address.take(near), distance2.take(near), edges.facet[batch].take(edge.take(near))
 
 
 def _reach(
@@ -130,15 +133,16 @@ def _reach(
     return left, np.clip(np.ceil(x.max(axis=0) + bleed + 0.5), left, width)
 
 
-def _distance2(point: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Squared distance (N,) of points to the segments a to b, all (N, 2)."""
-    run, away = b - a, point - a
-    length2 = (run * run).sum(axis=1)
-    along = (away * run).sum(axis=1)
+def _distance2(x: FloatArray, y: FloatArray, a: FloatArray, run: FloatArray, edge: IntArray) -> FloatArray:
+    """Squared distance (N,) of points x, y to segments `edge` (N,) of those from `a` along `run` (E, 2)."""
+    length2 = (run * run).sum(axis=1).take(edge)
+    run_x, run_y = run[:, 0].take(edge), run[:, 1].take(edge)
+    x, y = x - a[:, 0].take(edge), y - a[:, 1].take(edge)
+    along = x * run_x + y * run_y
     t = np.clip(np.divide(along, length2, out=np.zeros_like(along), where=length2 > 0), 0, 1)
-    rest = away - t[:, None] * run
-    result: FloatArray = (rest * rest).sum(axis=1)
-    return result
+    x -= t * run_x
+    y -= t * run_y
+    return x * x + y * y
 
 
 def _nearest(
