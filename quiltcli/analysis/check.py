@@ -30,7 +30,7 @@ from quiltcli.job import (
 )
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
-from quiltcli.layout.packing import layout_for
+from quiltcli.layout.from_job import layout_for
 from quiltcli.scene import load_scene
 from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import view_problems, viewers_of

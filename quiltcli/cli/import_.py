@@ -30,7 +30,8 @@ def import_(
     from quiltcli.display import load_display
     from quiltcli.exchange.pixelmaps import read_map
     from quiltcli.job import load_display_file
-    from quiltcli.layout import layout_picture, write_layout
+    from quiltcli.layout import write_layout
+    from quiltcli.layout.picture.picture import layout_picture
 
     facets = load_display(load_display_file(display)) if display is not None else None
     layout = read_map(file, facets, size=size, format_name=format_name)

@@ -55,8 +55,9 @@ def pack(
     """
     from quiltcli.display import load_display
     from quiltcli.job import load_display_file, pack_spec
-    from quiltcli.layout import fill, layout_picture, write_layout
+    from quiltcli.layout import fill, write_layout
     from quiltcli.layout.packing import pack as pack_facets
+    from quiltcli.layout.picture.picture import layout_picture
 
     facets = load_display(load_display_file(display))
     layout = pack_facets(facets, pack_spec(**wishes))

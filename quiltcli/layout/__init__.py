@@ -6,7 +6,6 @@ from quiltcli.layout.file import layout_text, read_layout, write_layout
 from quiltcli.layout.from_uv import layout_from_polygons, layout_from_uv
 from quiltcli.layout.layout import Layout, quilt_polygons, whole_pixel
 from quiltcli.layout.owners import pixel_owners
-from quiltcli.layout.picture.picture import layout_picture
 from quiltcli.layout.spans import Spans, facet_spans, fill
 
 __all__ = [
@@ -18,7 +17,6 @@ __all__ = [
     "fill",
     "layout_from_polygons",
     "layout_from_uv",
-    "layout_picture",
     "layout_problems",
     "layout_text",
     "pixel_owners",

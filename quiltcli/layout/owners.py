@@ -14,7 +14,7 @@ from quiltcli.layout.layout import Layout, quilt_polygons
 from quiltcli.layout.spans import Spans, facet_spans, overlaps, snapped
 
 Owners: TypeAlias = NDArray[np.int16] | NDArray[np.int32]
-_BATCH = 1_000_000  # candidate pixels looked at together: bounds the memory, not the result
+_BATCH = 200_000  # candidate pixels looked at together: bounds the memory, not the result
 
 
 def pixel_owners(layout: Layout, bleed: float = 0) -> Owners:
@@ -87,7 +87,7 @@ def _add_bleed(layout: Layout, owners: Owners, bleed: float) -> None:
     while batch < cost.size:
         done = cost[batch - 1] if batch else 0.0
         end = max(batch + 1, int(np.searchsorted(cost, done + _BATCH)))
-        found.append(_nearest(*_candidates(edges, slice(batch, end), owners, bleed)))
+        found.append(_candidates(edges, slice(batch, end), owners, bleed))
         batch = end
     if found:
         address, _, facet = _nearest(*(np.concatenate(parts) for parts in zip(*found, strict=True)))

@@ -14,7 +14,7 @@ from quiltcli.geometry import OwnerArray
 from quiltcli.images.names import layout_path
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
-from quiltcli.layout.packing import layout_for
+from quiltcli.layout.from_job import layout_for
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.source import SceneSource
 from quiltcli.viewer.clip import settled_clip

@@ -8,8 +8,8 @@ from PIL import Image
 
 from quiltcli.errors import OutputError
 from quiltcli.formats.drawing.shapes import Label, Shape
-from quiltcli.layout import layout_picture
 from quiltcli.layout.picture.drawing import draw_layout
+from quiltcli.layout.picture.picture import layout_picture
 from tests.helpers.flat_displays import flat_display, moved, placed, random_polygons, rectangle
 from tests.helpers.packed_layouts import pack
 

@@ -11,8 +11,7 @@ from click.testing import CliRunner
 
 from quiltcli.cli import main
 from quiltcli.job import job_sha256, load_job
-from quiltcli.layout import read_layout
-from quiltcli.layout.packing import from_job
+from quiltcli.layout import packing, read_layout
 from quiltcli.render.sequence import RenderOptions, render
 from tests.helpers.tiny_job import files_in, replaced, write_tiny_job
 
@@ -31,8 +30,8 @@ def packs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_tiny_job(tmp_path)
     render(load_job("job.yaml"))
-    pack = from_job.pack
-    monkeypatch.setattr(from_job, "pack", counted)
+    pack = packing.pack
+    monkeypatch.setattr(packing, "pack", counted)
     return calls
 
 

@@ -1,7 +1,6 @@
 """Packing: find a place in the quilt for every facet of a display."""
 
 from quiltcli.layout.packing.attempt import Attempt, Method
-from quiltcli.layout.packing.from_job import layout_for
 from quiltcli.layout.packing.methods import METHODS
 from quiltcli.layout.packing.model import PackInput, PackResult
 from quiltcli.layout.packing.pack import pack
@@ -12,6 +11,5 @@ __all__ = [
     "Method",
     "PackInput",
     "PackResult",
-    "layout_for",
     "pack",
 ]

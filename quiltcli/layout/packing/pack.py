@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -13,11 +12,11 @@ from quiltcli.display import Facets, corner_pixels
 from quiltcli.display.weld import weld
 from quiltcli.errors import LayoutError, Problem, raise_all
 from quiltcli.geometry import Int32Array, IntArray, segments
-from quiltcli.job.digest import wishes_sha256
 from quiltcli.job.layout import PACKING_METHODS, PackSpec
 from quiltcli.job.layout_table import places_sha256
 from quiltcli.layout.from_uv import layout_from_polygons
-from quiltcli.layout.layout import Layout, Packed
+from quiltcli.layout.layout import Layout
+from quiltcli.layout.packed import packed_from
 from quiltcli.layout.packing.methods import METHODS, has_all_arrangements
 from quiltcli.layout.packing.model import PackInput, PackResult, page_count, quilt_from_facet
 from quiltcli.layout.packing.pins import all_pins, free_rooms, joined
@@ -47,22 +46,6 @@ def pack(facets: Facets, wishes: PackSpec | None = None) -> Layout:
     wishes = wishes or PackSpec()
     layout = _packed_layout(facets, wishes)
     return replace(layout, packed=packed_from(facets, wishes, places_sha256(layout)))
-
-
-def packed_from(facets: Facets, wishes: PackSpec, places: str) -> Packed:
-    """What a layout of facets with this hash of its places is packed from.
-
-    Args:
-        facets: the display; its geometry has a hash of its own.
-        wishes: what the layout is to be like.
-        places: `places_sha256` of the layout.
-    """
-    digest = hashlib.sha256(np.packbits(facets.enabled).tobytes())
-    if facets.places is not None:
-        for each in (facets.places.facet, facets.places.page, facets.places.turn, facets.places.corner):
-            digest.update(np.ascontiguousarray(each, dtype="<i8").tobytes())
-        digest.update(np.packbits(facets.places.mirror).tobytes())
-    return Packed(wishes_sha256(wishes), digest.hexdigest(), places)
 
 
 def _packed_layout(facets: Facets, wishes: PackSpec) -> Layout:

@@ -7,9 +7,10 @@ from pathlib import Path
 from quiltcli.display import Facets
 from quiltcli.errors import QuiltError
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
-from quiltcli.job.layout_table import places_sha256
+from quiltcli.job.layout_table import places_sha256, read_layout_table
 from quiltcli.layout import Layout, align, layout_from_uv, read_layout
-from quiltcli.layout.packing.pack import pack, packed_from
+from quiltcli.layout.file import layout_from_table
+from quiltcli.layout.packed import packed_from
 
 
 def layout_for(
@@ -30,7 +31,7 @@ def layout_for(
         JobError, LayoutError: as `read_layout`, `pack`, `layout_from_uv` and `align` do.
     """
     if isinstance(choice, PackSpec):
-        layout = _kept(kept, choice, facets) or pack(facets, choice)
+        layout = _kept(kept, choice, facets) or _packed(choice, facets)
     elif isinstance(choice, UvLayoutSpec):
         layout = layout_from_uv(facets, choice.size)
     else:
@@ -39,13 +40,20 @@ def layout_for(
 
 
 def _kept(path: Path | None, wishes: PackSpec, facets: Facets) -> Layout | None:
-    """The layout of an earlier run, if nothing it came of has changed."""
+    """The layout of an earlier run, if nothing it came of has changed since."""
     if path is None or not path.is_file():
         return None
     try:
-        layout = read_layout(path)
+        layout = layout_from_table(read_layout_table(path))
     except QuiltError:  # what an earlier run left is no reason not to run again
         return None
     same = layout.display_sha256 == facets.sha256
     same = same and layout.packed == packed_from(facets, wishes, places_sha256(layout))
     return layout if same else None
+
+
+def _packed(wishes: PackSpec, facets: Facets) -> Layout:
+    # All that packs is loaded only by those who pack.
+    from quiltcli.layout.packing import pack
+
+    return pack(facets, wishes)

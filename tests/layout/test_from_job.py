@@ -6,7 +6,7 @@ import numpy as np
 
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
 from quiltcli.layout import layout_text, write_layout
-from quiltcli.layout.packing import layout_for
+from quiltcli.layout.from_job import layout_for
 from tests.helpers.flat_displays import flat_display, rectangle
 from tests.helpers.packed_layouts import pack
 
