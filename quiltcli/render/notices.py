@@ -10,6 +10,7 @@ from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words
 from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.rays.embree import has_embree
 
 
 def frame_warnings(stage: Stage, viewer: Viewer, lit: BoolArray, pairs: int, visible: int) -> Iterator[str]:
@@ -43,3 +44,5 @@ def stage_warnings(stage: Stage) -> Iterator[str]:
             "the path does not say where the head looks, on which no picture for one eye depends; depth is"
             " measured along the line to the display's middle (render.depth: radial measures the distance)"
         )
+    if not has_embree():
+        yield "embreex is not installed: triangles are sorted to facets without it, which takes longer"

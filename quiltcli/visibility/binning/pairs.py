@@ -17,6 +17,7 @@ from quiltcli.geometry import FloatArray, Int32Array, IntArray, gather_corners, 
 from quiltcli.visibility.binning.broad import candidate_pairs
 from quiltcli.visibility.binning.cones import Cones, Parts, facet_parts, lit_cones, overlapping
 from quiltcli.visibility.binning.cores import facet_cores
+from quiltcli.visibility.rays.embree import embree_scene, has_embree
 
 __all__ = [
     "Cones",
@@ -102,20 +103,21 @@ def common_value(values: Int32Array, triangles: Int32Array, drawn: IntArray) -> 
 
 
 class Cores:
-    """What the first pass casts rays at: of every lit part, what no other facet overlaps."""
+    """What the first pass casts rays at: of every lit part, what no other facet overlaps.
+
+    Where there is no Embree, nothing is met, and the second pass does all.
+    """
 
     def __init__(self, cones: Cones) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
+        self._part = np.full(1, -1, dtype=np.int32)
+        if not has_embree():
+            return
         corners, counts = facet_cores(cones)
         part, rank = segments(np.concatenate(([0], np.cumsum(np.maximum(counts - 2, 0)))))
         first = part * corners.shape[1]
         faces = np.stack((first, first + rank + 1, first + rank + 2), axis=1).astype(np.int32)
         self._part = np.append(part, -1).astype(np.int32)
-        self._scene = EmbreeScene()
-        if part.size:
-            TriangleMesh(self._scene, corners.reshape(-1, 3).astype(np.float32), faces)
+        self._scene = embree_scene(corners.reshape(-1, 3), faces)
 
     def met_by(self, vertices: FloatArray) -> Int32Array:
         """The part (V,) whose core the ray from the eye through each vertex (V, 3) meets, −1 for none."""

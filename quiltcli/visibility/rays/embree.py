@@ -66,23 +66,40 @@ def aim(vertices: FloatArray, triangles: Int32Array, viewer: Viewer, backface_cu
     # What ends before near begins would only have to be stepped through.
     named = np.flatnonzero(drawn & (farthest >= viewer.near * (1 - 1e-6)))
     plane = np.concatenate((normal, offset[:, None]), axis=1)
-    embree = _embree_scene(corners, triangles[named])
+    embree = embree_scene(corners, triangles[named])
+    if embree is None:
+        raise MissingExtraError(
+            "rays are cast with Embree, but embreex is not installed (not every kind of machine has it)"
+        )
     return Target(viewer, corners, triangles, plane, drawn, embree, named)
 
 
-def _embree_scene(corners: FloatArray, triangles: Int32Array) -> Any:
+def has_embree() -> bool:
+    """Whether there is an Embree on this machine."""
+    return _embree() is not None
+
+
+def embree_scene(corners: FloatArray, triangles: Int32Array) -> Any:
+    """Embree's scene of triangles (T, 3) of corners (V, 3); None where there is no Embree."""
+    embree = _embree()
+    if embree is None:
+        return None
+    make_scene, make_mesh = embree
+    scene = make_scene()
+    if len(triangles):
+        # Embree looks at 32 bits an index and does not check them.
+        make_mesh(scene, corners.astype(np.float32), np.ascontiguousarray(triangles, dtype=np.int32))
+    return scene
+
+
+def _embree() -> tuple[Any, Any] | None:
+    """What makes scenes and what makes meshes; this is the one place that imports Embree."""
     try:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
     except ImportError:
-        raise MissingExtraError(
-            "rays are cast with Embree, but embreex is not installed (not every kind of machine has it)"
-        ) from None
-    scene = EmbreeScene()
-    if len(triangles):
-        # Embree looks at 32 bits an index and does not check them.
-        TriangleMesh(scene, corners.astype(np.float32), np.ascontiguousarray(triangles, dtype=np.int32))
-    return scene
+        return None
+    return EmbreeScene, TriangleMesh
 
 
 def measure_along(viewer: Viewer, directions: FloatArray) -> FloatArray:
