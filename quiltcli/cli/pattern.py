@@ -42,7 +42,9 @@ def pattern(
 
     loaded = read_layout(layout)
     facets = known_display(loaded, display)
-    names = align(loaded, facets)[0].names if facets is not None else ()
+    if facets is not None:
+        align(loaded, facets)
+    names = facets.names if facets is not None else ()
     chosen = tuple(KINDS) if "all" in kinds else tuple(dict.fromkeys(kinds))
     paths = write_patterns(
         loaded, output, chosen, image_format=image_format, names=names, step=step, overwrite=overwrite

@@ -11,6 +11,7 @@ from quiltcli.display.facets import (
     corner_pixels,
     lit_facets,
     pitch_mm,
+    pitch_of,
     shared_edges,
     triangulate,
 )
@@ -25,6 +26,7 @@ __all__ = [
     "lit_facets",
     "load_display",
     "pitch_mm",
+    "pitch_of",
     "shared_edges",
     "triangulate",
 ]

@@ -169,7 +169,12 @@ def shared_edges(facets: Facets) -> SharedEdges:
 
 def pitch_mm(facets: Facets) -> tuple[float, float]:
     """Least and greatest distance between neighbouring pixels of the enabled facets, millimetres."""
-    steps = np.concatenate((facets.du[facets.enabled], facets.dv[facets.enabled]))
+    return pitch_of(facets.du[facets.enabled], facets.dv[facets.enabled])
+
+
+def pitch_of(du: FloatArray, dv: FloatArray) -> tuple[float, float]:
+    """Least and greatest length of steps (F, 3) to the next pixel right and down, millimetres."""
+    steps = np.concatenate((du, dv))
     if not len(steps):
         return 0.0, 0.0
     pitch = np.sqrt(dot(steps, steps)) * 1000

@@ -195,7 +195,7 @@ class LayoutFile(FileModel):
     facets: Annotated[tuple[PlaceSpec, ...], Listed, Field(min_length=1)]
     """Places of the facets."""
     packed: PackedSpec | None = None
-    """What it was packed from; absent when it was not packed."""
+    """What it was packed from, as a render notes it; absent in others."""
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Ids are unique, pages exist, no map flattens its facet."""

@@ -1,4 +1,4 @@
-"""Bring a display and a layout together: same facets, same rasters."""
+"""Bring a layout and its display together: the same facets, in the same order."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ import numpy as np
 
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import FloatArray, IntArray, cross, dot, segments
+from quiltcli.geometry import FloatArray, IntArray, dot, segments
 from quiltcli.layout.layout import Layout
 
 _OFF_PLANE = 2e-4  # of a facet's size: twice what a face may be out of plane
 
 
-def align(layout: Layout, facets: Facets) -> tuple[Facets, Layout]:
-    """The display with the layout's rasters, and the layout with one row per facet of the display.
+def align(layout: Layout, facets: Facets) -> Layout:
+    """The layout with one row for every facet of the display, in the display's order.
 
-    The layout's rasters are authoritative: they say which pixels exist. Disabled facets get page −1.
+    From here on it is the layout that is asked which pixels there are and where they lie in the world.
+    The rasters of the display are those it was to be packed with; where a layout has others, as one
+    from texture coordinates has, the layout is right. Disabled facets get page −1 and the display's raster.
 
     Returns:
-        facets with `origin`, `du`, `dv`, `size` and `mirrored` of the layout, and the layout with
-        `facet` = 1 … F.
+        the layout with `facet` = 1 … F.
 
     Raises:
         LayoutError: made for other geometry, an unknown facet, an enabled facet without a place, or
@@ -33,41 +34,23 @@ def align(layout: Layout, facets: Facets) -> tuple[Facets, Layout]:
     row = np.full(facets.count, -1)
     row[layout.facet - 1] = np.arange(layout.facet.size)
     known = row >= 0
-    origin, du, dv = (_taken(new, old, row) for new, old in _rasters(layout, facets))
-    facing = dot(cross(dv, du), facets.normal)
-    placed = replace(
-        facets,
-        origin=origin,
-        du=du,
-        dv=dv,
-        size=np.where(known[:, None], layout.size[row], facets.size).astype(np.int32),
-        mirrored=np.where(known, facing < 0, facets.mirrored),
-    )
-    whole = replace(
+
+    def taken(ours: FloatArray, theirs: FloatArray) -> FloatArray:
+        return np.asarray(np.where(known[:, None], ours[row], theirs))
+
+    return replace(
         layout,
         facet=np.arange(1, facets.count + 1, dtype=np.int32),
         page=np.where(known & facets.enabled, layout.page[row], -1).astype(np.int32),
-        size=placed.size,
+        size=np.where(known[:, None], layout.size[row], facets.size).astype(np.int32),
         quilt_from_facet=np.where(known[:, None, None], layout.quilt_from_facet[row], np.eye(2, 3)),
-        origin=origin,
-        du=du,
-        dv=dv,
+        origin=taken(layout.origin, facets.origin),
+        du=taken(layout.du, facets.du),
+        dv=taken(layout.dv, facets.dv),
         corner_start=facets.corner_start,
-        polygon=_polygons(layout, placed, row),
+        polygon=_polygons(layout, facets, row),
         file_row=None if layout.file_row is None else np.where(known, layout.file_row[row], 0),
     )
-    return placed, whole
-
-
-def _rasters(layout: Layout, facets: Facets) -> Iterator[tuple[FloatArray, FloatArray]]:
-    yield layout.origin, facets.origin
-    yield layout.du, facets.du
-    yield layout.dv, facets.dv
-
-
-def _taken(new: FloatArray, old: FloatArray, row: IntArray) -> FloatArray:
-    result: FloatArray = np.where((row >= 0)[:, None], new[row], old)
-    return result
 
 
 def _polygons(layout: Layout, facets: Facets, row: IntArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from quiltcli.display import Facets
@@ -13,10 +14,8 @@ from quiltcli.layout.file import layout_from_table
 from quiltcli.layout.packed import packed_from
 
 
-def layout_for(
-    choice: Path | PackSpec | UvLayoutSpec, facets: Facets, kept: Path | None = None
-) -> tuple[Facets, Layout]:
-    """Read, pack or take from texture coordinates the layout a job asks for, and align the display with it.
+def layout_for(choice: Path | PackSpec | UvLayoutSpec, facets: Facets, kept: Path | None = None) -> Layout:
+    """Read, pack or take from texture coordinates the layout a job asks for, and align it with the display.
 
     Args:
         choice: what the job says.
@@ -25,7 +24,7 @@ def layout_for(
             is what packing these facets so came to, and was not changed since.
 
     Returns:
-        facets and layout as `quiltcli.layout.align` gives them: one row per facet of the display.
+        the layout as `quiltcli.layout.align` gives it: one row per facet of the display.
 
     Raises:
         JobError, LayoutError: as `read_layout`, `pack`, `layout_from_uv` and `align` do.
@@ -53,7 +52,9 @@ def _kept(path: Path | None, wishes: PackSpec, facets: Facets) -> Layout | None:
 
 
 def _packed(wishes: PackSpec, facets: Facets) -> Layout:
+    """The layout, packed now, and what it came of."""
     # All that packs is loaded only by those who pack.
     from quiltcli.layout.packing import pack
 
-    return pack(facets, wishes)
+    layout = pack(facets, wishes)
+    return replace(layout, packed=packed_from(facets, wishes, places_sha256(layout)))

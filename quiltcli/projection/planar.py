@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.display import Facets
 from quiltcli.geometry import BoolArray, FloatArray, cross, dot
 from quiltcli.layout import Layout
 
@@ -37,7 +36,7 @@ class QuiltRays:
     quilt_from_eye: FloatArray
 
 
-def quilt_rays(facets: Facets, layout: Layout, lit: BoolArray, eye: FloatArray) -> QuiltRays:
+def quilt_rays(layout: Layout, lit: BoolArray, eye: FloatArray) -> QuiltRays:
     """Rays of `eye` through every facet's place in the quilt.
 
     Args:
@@ -47,13 +46,13 @@ def quilt_rays(facets: Facets, layout: Layout, lit: BoolArray, eye: FloatArray) 
         eye: (3,) world metres.
     """
     drawn = lit & (layout.page >= 0)
-    rays = eye_from_quilt(facets, layout, eye)
+    rays = eye_from_quilt(layout, eye)
     inverse = np.zeros_like(rays)
     inverse[drawn] = inverse_3x3(rays[drawn])
     return QuiltRays(eye, drawn, rays, inverse)
 
 
-def eye_from_quilt(facets: Facets, layout: Layout, eye: FloatArray) -> FloatArray:
+def eye_from_quilt(layout: Layout, eye: FloatArray) -> FloatArray:
     """Matrices (F, 3, 3) with the columns du', dv', origin' − eye on the page."""
     linear = layout.quilt_from_facet[:, :, :2]
     det = linear[:, 0, 0] * linear[:, 1, 1] - linear[:, 0, 1] * linear[:, 1, 0]
@@ -61,10 +60,10 @@ def eye_from_quilt(facets: Facets, layout: Layout, eye: FloatArray) -> FloatArra
     b = -linear[:, 0, 1] / det
     c = -linear[:, 1, 0] / det
     d = linear[:, 0, 0] / det
-    du = a[:, None] * facets.du + c[:, None] * facets.dv
-    dv = b[:, None] * facets.du + d[:, None] * facets.dv
+    du = a[:, None] * layout.du + c[:, None] * layout.dv
+    dv = b[:, None] * layout.du + d[:, None] * layout.dv
     shift = layout.quilt_from_facet[:, :, 2]
-    corner = facets.origin - shift[:, :1] * du - shift[:, 1:] * dv
+    corner = layout.origin - shift[:, :1] * du - shift[:, 1:] * dv
     return np.stack((du, dv, corner - eye), axis=-1)
 
 

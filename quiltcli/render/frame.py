@@ -52,7 +52,7 @@ def draw_frame(
         lit &= only
     with clock.stage("bin"):
         crew.begin(stage)
-        rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
+        rays = quilt_rays(stage.layout, lit, viewer.eye)
         binned = crew.bin(viewer, rays)
     frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
     with clock.stage("clear"):

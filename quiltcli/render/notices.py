@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from quiltcli.display import pitch_mm
+from quiltcli.display import pitch_of
 from quiltcli.geometry import BoolArray
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words
@@ -27,7 +27,8 @@ def frame_warnings(stage: Stage, viewer: Viewer, lit: BoolArray, pairs: int, vis
 
 def stage_warnings(stage: Stage) -> Iterator[str]:
     """What is worth a second look before rendering starts."""
-    least, greatest = pitch_mm(stage.facets)
+    layout = stage.layout
+    least, greatest = pitch_of(layout.du[layout.page >= 0], layout.dv[layout.page >= 0])
     if least < 0.1 or greatest > 100:
         yield (
             f"the pixel pitch is {least:.3g} to {greatest:.3g} mm, outside 0.1 to 100 mm:"

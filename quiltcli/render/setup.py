@@ -29,8 +29,8 @@ class Stage:
 
     Attributes:
         job: the job.
-        facets: the display, with the rasters the layout was made for.
-        layout: the facets' places, one row a facet.
+        facets: the display.
+        layout: the facets' pixels and their places, one row a facet.
         scene: the scene.
         parts: convex pieces of the facets.
         blocks: the facets' rectangles, cut for the rasterizer.
@@ -75,7 +75,8 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
         QuiltError: a file is wrong, or the layout does not belong to the display.
     """
     kept = layout_path(folder or job.output.directory)
-    facets, layout = layout_for(job.layout or PackSpec(), load_display(load_display_file(job.display)), kept)
+    facets = load_display(load_display_file(job.display))
+    layout = layout_for(job.layout or PackSpec(), facets, kept)
     return stage_of(job, facets, layout, load_scene(load_scene_file(job.scene)), job.render.bleed)
 
 

@@ -299,7 +299,7 @@ class _Workplace:
 
     def begin(self, task: _Task) -> None:
         """Turn to another frame."""
-        rays = quilt_rays(self._stage.facets, self._stage.layout, task.lit, task.viewer.eye)
+        rays = quilt_rays(self._stage.layout, task.lit, task.viewer.eye)
         self._plan, self._frame = plan_of(self._stage, task.viewer, rays), None
 
     def move(self, moved: _Moved, connection: Connection) -> None:

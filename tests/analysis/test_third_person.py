@@ -45,7 +45,7 @@ def test_the_camera_sees_the_display_and_the_eye(eye):
     facets = cube()
     camera, fov = third_person_camera(viewer(eye, (0, 0, -1)), facets, None, None, 4 / 3)
     through = camera_display(camera, 400, 300, fov)
-    back = np.linalg.inv(eye_from_quilt(*through, camera.eye)[0])
+    back = np.linalg.inv(eye_from_quilt(through[1], camera.eye)[0])
     for point in (*facets.corners, np.array(eye)):
         x, y, w = back @ (point - camera.eye)
         assert w > 0

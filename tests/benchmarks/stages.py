@@ -80,7 +80,8 @@ def job_of(*, culling: bool) -> JobFile:
 
 def stage_for(place: Place, mesh: Mesh, size: tuple[int, int] | None = None) -> Stage:
     """A two-sided stage: the mesh about the display's middle, the facets packed in rows."""
-    facets, layout = align(pack(place.facets, "rows", size), place.facets)
+    facets = place.facets
+    layout = align(pack(facets, "rows", size), facets)
     scene = scene_of(replace(mesh, vertices=mesh.vertices * place.reach + place.middle))
     return stage_of(job_of(culling=False), facets, layout, scene, bleed=2)
 
@@ -111,7 +112,7 @@ class Work:
 
 def binned(stage: Stage, seen_by: Viewer) -> Work:
     """Bin a frame the way `draw_frame` does, and draw nothing."""
-    rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, seen_by.eye), seen_by.eye)
+    rays = quilt_rays(stage.layout, lit_facets(stage.facets, seen_by.eye), seen_by.eye)
     found = bin_frame(plan_of(stage, seen_by, rays))
     frame = Frame(seen_by, found.sight, rays, stage.blocks, found.pairs)
     return Work(stage.scene, frame, batches(frame))

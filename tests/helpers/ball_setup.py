@@ -46,5 +46,5 @@ def stage_of_facets(facets: Facets, scene: Scene, bleed: int = 0) -> Stage:
         "frames": "1",
         "viewer": {"near": 0.1, "far": 9, "path": path},
     }
-    facets, layout = align(pack(facets, "rows"), facets)
+    layout = align(pack(facets, "rows"), facets)
     return stage_of(JobFile.model_validate(spec), facets, layout, scene, bleed)

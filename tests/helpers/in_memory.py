@@ -148,9 +148,9 @@ def picture(
     """Bin and rasterize triangles."""
     vertices = np.asarray(vertices, np.float64)
     triangles = np.asarray(triangles, np.int32).reshape(-1, 3)
-    facets, layout = align(layout or pack(facets, "rows", padding=2), facets)
+    layout = align(layout or pack(facets, "rows", padding=2), facets)
     owners = pixel_owners(layout, bleed)
-    rays = quilt_rays(facets, layout, lit_facets(facets, eye.eye), eye.eye)
+    rays = quilt_rays(layout, lit_facets(facets, eye.eye), eye.eye)
     local = vertices - eye.eye
     wanted, cut = triangles_in_range(eye.depth_of(local.T), local, triangles, eye)
     pairs = bin_triangles(local, triangles, wanted, facet_parts(facets, layout, bleed), rays.lit, eye.eye)

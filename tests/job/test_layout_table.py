@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +13,13 @@ from quiltcli.job import layout_table as module
 from quiltcli.job import load_layout_file
 from quiltcli.job.layout_table import LayoutLines, places_sha256, read_layout_table, table_of
 from quiltcli.layout import write_layout
+from quiltcli.layout.layout import Packed
 from tests.helpers.flat_displays import flat_display, random_polygons
 from tests.helpers.packed_layouts import pack
 
 SHARDS = flat_display(random_polygons(9, 3, 20, seed=5))
-LAYOUTS = {method: pack(SHARDS, method, seconds=0.1) for method in ("rows", "net")}
+PACKED = Packed("1" * 64, "2" * 64, "3" * 64)
+LAYOUTS = {method: replace(pack(SHARDS, method, seconds=0.1), packed=PACKED) for method in ("rows", "net")}
 
 
 @pytest.fixture

@@ -18,8 +18,8 @@ EYE = np.array([1.7, 2.1, 2.9])
 @pytest.fixture(scope="module")
 def cube_rays():
     facets = cube()
-    facets, layout = align(pack(facets, "rects"), facets)
-    return facets, layout, quilt_rays(facets, layout, lit_facets(facets, EYE), EYE)
+    layout = align(pack(facets, "rects"), facets)
+    return facets, layout, quilt_rays(layout, lit_facets(facets, EYE), EYE)
 
 
 def test_rays_through_a_facets_corners_end_at_its_corners(cube_rays):
@@ -41,9 +41,9 @@ def test_points_go_back_to_their_pixels_with_w_one_on_the_facet(cube_rays):
 
 def test_w_is_depth_in_units_of_the_facet():
     facets = panel()
-    facets, layout = align(pack(facets, "rows"), facets)
+    layout = align(pack(facets, "rows"), facets)
     eye = np.array([0.0, 0, 2])
-    rays = quilt_rays(facets, layout, lit_facets(facets, eye), eye)
+    rays = quilt_rays(layout, lit_facets(facets, eye), eye)
     assert (rays.quilt_from_eye[0] @ [0, 0, -6])[2] == pytest.approx(3)
     assert (rays.quilt_from_eye[0] @ [0, 0, 1])[2] < 0
 

@@ -42,8 +42,8 @@ ALL = ("rgba", "Z", "zv", "facet", "object", "triangle", "N", "P")
 
 def standing(facets, eye):
     """The facets with their rays, as `depth_order` wants them."""
-    facets, layout = align(pack(facets, "rows", padding=2), facets)
-    return facets, quilt_rays(facets, layout, lit_facets(facets, eye.eye), eye.eye)
+    layout = align(pack(facets, "rows", padding=2), facets)
+    return facets, quilt_rays(layout, lit_facets(facets, eye.eye), eye.eye)
 
 
 def canonical(order: DepthOrder, facet: int, point) -> float:

@@ -64,7 +64,8 @@ class Binned:
         rng = np.random.default_rng(seed)
         size = 10 ** rng.uniform(-2.5, 0.7, (400, 1, 1))
         corners = rng.uniform(-2.5, 2.5, (400, 1, 3)) + size * rng.uniform(-1, 1, (400, 3, 3))
-        self.facets, self.layout = align(pack(facets := make(), "rows"), facets)
+        self.facets = make()
+        self.layout = align(pack(self.facets, "rows"), self.facets)
         self.viewer = viewer(eye, depth="radial", near=1e-3)
         self.vertices = corners.reshape(-1, 3) - self.viewer.eye
         self.triangles = np.arange(1200, dtype=np.int32).reshape(-1, 3)
@@ -148,7 +149,7 @@ def test_among_very_many_pairs_small_triangles_are_kept_with_little_waste(monkey
 
 def test_most_small_triangles_are_settled_by_the_first_pass():
     vertices, triangles = icosphere(5)
-    facets, layout = align(pack(facets := cube(200), "rows"), facets)
+    layout = align(pack(facets := cube(200), "rows"), facets)
     eye = np.array([2.2, 1.8, 3.2])
     everything = np.ones(len(triangles), bool)
     parts = facet_parts(facets, layout, 2)
@@ -159,7 +160,7 @@ def test_most_small_triangles_are_settled_by_the_first_pass():
 
 
 def test_a_facet_alone_is_its_own_core():
-    facets, layout = align(pack(facets := panel(), "rows"), facets)
+    layout = align(pack(facets := panel(), "rows"), facets)
     lit = lit_cones(facet_parts(facets, layout, 2), np.ones(1, bool), np.array([0.0, 0, 3]))
     corners, counts = facet_cores(lit)
     np.testing.assert_array_equal(corners[0, : counts[0]], lit.corners[0])
@@ -169,7 +170,7 @@ def test_cores_of_neighbours_leave_the_bleed_between_them():
     strip = display(
         [(0, 0, 0), (1, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (0, 1, 0)], [[0, 1, 4, 5], [1, 2, 3, 4]], 100
     )
-    facets, layout = align(pack(strip, "rows"), strip)
+    facets, layout = strip, align(pack(strip, "rows"), strip)
     lit = lit_cones(facet_parts(facets, layout, 2), np.ones(2, bool), np.array([1.0, 0.5, 3]))
     corners, counts = facet_cores(lit)
     assert counts.tolist() == [4, 4]
@@ -183,7 +184,7 @@ def test_facets_behind_each_other_keep_only_what_they_do_not_share():
         [[0, 1, 2, 3], [4, 5, 6, 7]],
         40,
     )
-    facets, layout = align(pack(two, "rows"), two)
+    facets, layout = two, align(pack(two, "rows"), two)
     lit = lit_cones(facet_parts(facets, layout, 2), np.ones(2, bool), np.array([0.0, 0, 3]))
     _, counts = facet_cores(lit)
     assert counts.tolist() == [0, 4]  # of the larger one a side remains that the smaller does not reach
@@ -191,7 +192,7 @@ def test_facets_behind_each_other_keep_only_what_they_do_not_share():
 
 def test_nothing_is_lit_nothing_is_paired():
     vertices, triangles = icosphere(1)
-    facets, layout = align(pack(facets := panel(), "rows"), facets)
+    layout = align(pack(facets := panel(), "rows"), facets)
     eye = np.array([0.0, 0, -3])
     parts = facet_parts(facets, layout, 2)
     pairs = bin_triangles(vertices - eye, triangles, np.ones(80, bool), parts, lit_facets(facets, eye), eye)

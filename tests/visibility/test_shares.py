@@ -38,7 +38,7 @@ def test_shares_together_have_the_pairs_of_the_whole(culling, depth):
     stage = replace(stage, job=stage.job.model_copy(update={"render": render}))
     # Some triangles are cut by near and far, some are left out.
     eye = viewer((2.2, 1.8, 3.2), near=3.7, far=4.2, depth=depth)
-    rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, eye.eye), eye.eye)
+    rays = quilt_rays(stage.layout, lit_facets(stage.facets, eye.eye), eye.eye)
     plan = plan_of(stage, eye, rays)
     whole = bin_frame(plan)
     seen = unseen(stage.scene)
@@ -66,7 +66,7 @@ def test_triangles_well_inside_a_block_are_found_where_their_boxes_are(density):
     """Facets of one block and of several; what is settled at once is what the boxes of all pairs say."""
     stage = stage_of_facets(cube(density), ball_scene(5))
     eye = viewer((2.2, 1.8, 3.2))
-    rays = quilt_rays(stage.facets, stage.layout, lit_facets(stage.facets, eye.eye), eye.eye)
+    rays = quilt_rays(stage.layout, lit_facets(stage.facets, eye.eye), eye.eye)
     plan = plan_of(stage, eye, rays)
     seen = unseen(stage.scene)
     see_vertices(plan, slice(0, len(stage.scene.vertices)), seen)

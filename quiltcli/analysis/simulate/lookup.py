@@ -59,7 +59,7 @@ class Shown:
     @cached_property
     def rays(self) -> QuiltRays:
         """The viewer's rays through the quilt."""
-        return quilt_rays(self.facets, self.layout, self.lit, self.eye)
+        return quilt_rays(self.layout, self.lit, self.eye)
 
 
 def quilt_places(
@@ -77,7 +77,7 @@ def quilt_places(
     Returns:
         (2, P) continuous pixels.
     """
-    matrices = quilt_rays(shown.facets, shown.layout, lit, eye).quilt_from_eye
+    matrices = quilt_rays(shown.layout, lit, eye).quilt_from_eye
     result = np.empty((2, facet.size))
     for start in range(0, facet.size, _BLOCK):
         part = slice(start, start + _BLOCK)

@@ -113,7 +113,7 @@ def displayed_light(
 
 def picture_rays(camera: Viewer, through: Camera, pixel: IntArray) -> FloatArray:
     """Directions (3, P) from the camera through the centres of picture pixels with these addresses."""
-    matrix = eye_from_quilt(*through, camera.eye)[0]
+    matrix = eye_from_quilt(through[1], camera.eye)[0]
     row, column = np.divmod(pixel, through[1].pages[0, 0])
     result: FloatArray = matrix[:, :1] * (column + 0.5) + matrix[:, 1:2] * (row + 0.5) + matrix[:, 2:]
     return result

@@ -90,7 +90,7 @@ def facet_windows(
     low, high = _bounds(row, place)
     corner = np.floor(low).astype(np.int64) - _MARGIN
     size = (np.ceil(high).astype(np.int64) + _MARGIN - corner).astype(np.int32)
-    du, dv, first = (eye_from_quilt(facets, layout, eye)[chosen, :, k] for k in range(3))
+    du, dv, first = (eye_from_quilt(layout, eye)[chosen, :, k] for k in range(3))
     origin = eye + first + corner[:, :1] * du + corner[:, 1:] * dv
     # Facets that are lit on both sides are seen on the one that the eye is on.
     away = dot(origin - eye, facets.normal[chosen])[:, None]

@@ -219,7 +219,7 @@ def _check_blocks(trial: Trial, blocks: Iterator[IntArray], threads: int) -> tup
 def make_trial(stage: Stage, viewer: Viewer, images: Images) -> Trial:
     """Prepare what the pixels of a frame are verified with."""
     scene = stage.scene
-    rays = quilt_rays(stage.facets, stage.layout, their_lit_facets(stage.facets, viewer), viewer.eye)
+    rays = quilt_rays(stage.layout, their_lit_facets(stage.facets, viewer), viewer.eye)
     target = aim(scene.vertices, scene.triangles, viewer, stage.job.render.backface_culling)
     neighbours = Neighbours(scene.vertices, scene.triangles)
     return Trial(stage.layout, stage.owners, rays, target, neighbours, images)

@@ -37,7 +37,7 @@ def page_data(
         "nearest": options.nearest,
         "mesh": _mesh_data(mesh),
         "names": list(facets.names) if any(facets.names) else [],
-        "sizes": facets.size.tolist(),
+        "sizes": folder.stage.layout.size.tolist(),
         "path": packed((eye_path(folder) - mesh.centre).astype(np.float32)),
         "ghost": _ghost_data(ghost),
         "frames": [_frame_data(frame, mesh) for frame in seen],

@@ -13,10 +13,8 @@ from quiltcli.display.weld import weld
 from quiltcli.errors import LayoutError, Problem, raise_all
 from quiltcli.geometry import Int32Array, IntArray, segments
 from quiltcli.job.layout import PACKING_METHODS, PackSpec
-from quiltcli.job.layout_table import places_sha256
 from quiltcli.layout.from_uv import layout_from_polygons
 from quiltcli.layout.layout import Layout
-from quiltcli.layout.packed import packed_from
 from quiltcli.layout.packing.methods import METHODS, has_all_arrangements
 from quiltcli.layout.packing.model import PackInput, PackResult, page_count, quilt_from_facet
 from quiltcli.layout.packing.pins import all_pins, free_rooms, joined
@@ -44,12 +42,6 @@ def pack(facets: Facets, wishes: PackSpec | None = None) -> Layout:
             says what would do.
     """
     wishes = wishes or PackSpec()
-    layout = _packed_layout(facets, wishes)
-    return replace(layout, packed=packed_from(facets, wishes, places_sha256(layout)))
-
-
-def _packed_layout(facets: Facets, wishes: PackSpec) -> Layout:
-    """The layout; what it came of is not written down yet."""
     raise_all(LayoutError, _bad_arguments(facets, wishes))
     pins = all_pins(facets, wishes)
     waiting = facets.enabled.copy()
@@ -61,7 +53,13 @@ def _packed_layout(facets: Facets, wishes: PackSpec) -> Layout:
     raise_all(LayoutError, _too_large(facets, rows, wishes))
     if pins is not None and not rows.size:
         return replace(
-            pins, display=facets.path, display_sha256=facets.sha256, path="", place=None, file_row=None
+            pins,
+            display=facets.path,
+            display_sha256=facets.sha256,
+            packed=None,
+            path="",
+            place=None,
+            file_row=None,
         )
     groups = list(_groups(facets, rows, wishes))
     if len(groups) > 1:
@@ -117,7 +115,7 @@ def _stacked(facets: Facets, groups: Sequence[IntArray], wishes: PackSpec) -> La
     for group in groups:
         enabled = np.zeros(facets.count, dtype=np.bool_)
         enabled[group] = True
-        layout = _packed_layout(replace(facets, enabled=enabled), alone)
+        layout = pack(replace(facets, enabled=enabled), alone)
         if whole is not None:
             before = np.zeros_like(whole.pages)
             layout = replace(

@@ -49,7 +49,7 @@ def cast_frame(
     lit = lit_facets(stage.facets, viewer.eye)
     if only is not None:
         lit &= only
-    rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
+    rays = quilt_rays(stage.layout, lit, viewer.eye)
     target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     clear(stage, buffers, only)

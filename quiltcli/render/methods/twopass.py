@@ -46,7 +46,7 @@ def draw_twice(
         lit &= only
     clear(stage, buffers, only)
     visible = 0
-    rays = quilt_rays(stage.facets, stage.layout, lit, viewer.eye)
+    rays = quilt_rays(stage.layout, lit, viewer.eye)
     for address in pixels_of(stage, rays.lit):
         pixels = places(address, stage.layout, stage.owners, rays)
         place = _projected(to_picture, pixels.directions())
@@ -95,8 +95,8 @@ def picture_size(stage: Stage, viewer: Viewer, lit: BoolArray) -> tuple[tuple[in
 def picture_from_eye(stage: Stage, viewer: Viewer, lit: BoolArray, size: tuple[int, int]) -> FloatArray:
     """The map (3, 3) from directions to homogeneous pixels of the picture."""
     _, fov = picture_size(stage, viewer, lit)
-    facets, layout = camera_display(viewer, *size, fov)
-    return np.asarray(quilt_rays(facets, layout, np.ones(1, dtype=np.bool_), viewer.eye).quilt_from_eye[0])
+    _, layout = camera_display(viewer, *size, fov)
+    return np.asarray(quilt_rays(layout, np.ones(1, dtype=np.bool_), viewer.eye).quilt_from_eye[0])
 
 
 def _projected(to_picture: FloatArray, directions: FloatArray) -> FloatArray:

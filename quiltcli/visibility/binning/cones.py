@@ -78,13 +78,13 @@ def facet_parts(facets: Facets, layout: Layout, bleed: int) -> Parts:
     placed = np.flatnonzero(layout.page[facet] >= 0)
     facet = facet[placed]
     polygons = [facets.corners[corners[start[k] : start[k + 1]]] for k in placed.tolist()]
-    basis = np.stack((facets.du, facets.dv), axis=2) @ np.linalg.inv(layout.quilt_from_facet[:, :, :2])
+    basis = np.stack((layout.du, layout.dv), axis=2) @ np.linalg.inv(layout.quilt_from_facet[:, :, :2])
     wide = list(polygons)
     counts = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
     for count in np.unique(counts).tolist():
         alike = np.flatnonzero(counts == count).tolist()
         some = np.stack([polygons[k] for k in alike])
-        grown = _grow(some, basis[facet[alike]], facets.origin[facet[alike]], bleed + 1.0)
+        grown = _grow(some, basis[facet[alike]], layout.origin[facet[alike]], bleed + 1.0)
         for k, polygon in zip(alike, grown, strict=True):
             wide[k] = polygon
     return Parts(facet.astype(np.int32), _padded(polygons), _padded(wide))
