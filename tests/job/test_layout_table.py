@@ -18,7 +18,7 @@ from tests.helpers.flat_displays import flat_display, random_polygons
 from tests.helpers.packed_layouts import pack
 
 SHARDS = flat_display(random_polygons(9, 3, 20, seed=5))
-PACKED = Packed("1" * 64, "2" * 64, "3" * 64)
+PACKED = Packed("a" * 64, "b" * 64, "c" * 64)
 LAYOUTS = {method: replace(pack(SHARDS, method, seconds=0.1), packed=PACKED) for method in ("rows", "net")}
 
 
