@@ -99,9 +99,9 @@ def _area(text: str) -> tuple[float, ...]:
 
 
 def _packing_methods() -> Iterable[str]:
-    from quiltcli.layout.packing import METHODS
+    from quiltcli.job.layout import PACKING_METHODS
 
-    return METHODS
+    return PACKING_METHODS
 
 
 def _render_methods() -> Iterable[str]:
