@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from quiltcli import __version__
+from quiltcli.ending import end_by_error, ended
 from quiltcli.errors import QuiltError
 
 COMMANDS = (
@@ -48,14 +49,15 @@ class Quilt(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; errors that are the user's to mend become one line a problem."""
         try:
+            end_by_error()
             return super().invoke(ctx)
         except QuiltError as error:
             if ctx.params.get("debug"):
                 raise
             click.echo(f"error: {error}" if len(error.problems) == 1 else str(error), err=True)
             ctx.exit(error.exit_code)
-        except KeyboardInterrupt:
-            ctx.exit(130)
+        except KeyboardInterrupt as error:
+            ctx.exit(ended(error))
         except MemoryError:
             if ctx.params.get("debug"):
                 raise
@@ -64,6 +66,8 @@ class Quilt(click.Group):
         except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
             raise
         except Exception as error:
+            if code := ended(error):  # a library has made another error of it
+                ctx.exit(code)
             if ctx.params.get("debug"):
                 raise
             click.echo(f"error: {_unexpected(error)}", err=True)

@@ -20,7 +20,12 @@ from quiltcli.cli.printing import print_aligned
 @OVERWRITE
 @click.option("--facets", type=FACETS, help="Draw only these facets, such as 3,7-9, into existing quilts.")
 @THREADS
-@click.option("--scheduler", metavar="ADDRESS", help="Hand the frames to a dask scheduler.")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Hand the frames to a dask scheduler; it and its workers need the same quilt, and workers the same"
+    " files at the same paths.",
+)
 @click.option("--dry-run", is_flag=True, help="Find every problem, write nothing.")
 @click.option("--profile", is_flag=True, help="Say where the time went, by stage.")
 @SETS

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from quiltcli.formats.gltf.container import files_beside
+from quiltcli.formats.noted import note_digest, note_input, noted_digest
 from quiltcli.job.dump import plain
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import PackSpec
@@ -27,7 +28,8 @@ def job_sha256(job: JobFile) -> str:
     mesh changes it. A layout counts by how it was packed, whether the job says that or names the file
     that came of it; a layout that was not packed, or changed since, counts by its places. Which frames
     are rendered, where to, whether as quilts or facet images, and what becomes of facets that are not
-    lit, makes no difference to any pixel and is left out.
+    lit, makes no difference to any pixel and is left out. Within `noting_inputs` files count as they were
+    read, whatever they are by now.
     """
     data = plain(job, file_sha256)
     data["display"] = plain(load_display_file(job.display), file_sha256)
@@ -73,8 +75,19 @@ def file_sha256(path: Path) -> str:
 
 
 def _sha256(path: Path) -> bytes:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").digest()
+    """Hash of a file: as it was read, or else as it is now."""
+    digest = noted_digest(path)
+    if digest is None:
+        with path.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        note_digest(path, digest)
+    return bytes.fromhex(digest)
+
+
+def _bytes(path: Path) -> bytes:
+    data = path.read_bytes()
+    note_input(path, data)
+    return data
 
 
 def _drawn_in(path: Path) -> Iterator[Path]:
@@ -93,7 +106,5 @@ def _drawn_in(path: Path) -> Iterator[Path]:
 
 def _named(path: Path, words: bytes) -> Iterator[str]:
     """Last word of every line that starts with one of some words."""
-    for match in re.finditer(
-        rb"^[ \t]*(?:" + words + rb")[ \t]+(.*?)[ \t\r]*$", path.read_bytes(), re.MULTILINE
-    ):
+    for match in re.finditer(rb"^[ \t]*(?:" + words + rb")[ \t]+(.*?)[ \t\r]*$", _bytes(path), re.MULTILINE):
         yield match[1].split()[-1].decode("utf-8", "replace") if match[1].split() else ""

@@ -13,11 +13,12 @@ import numpy as np
 from quiltcli import __version__
 from quiltcli.display import lit_facets
 from quiltcli.errors import OutputError, Problem, raise_all
+from quiltcli.formats.exr.digest import is_sealed
 from quiltcli.formats.exr.image import Channel, Image, read_exr, read_header, write_images
-from quiltcli.formats.whole import link_whole, make_folder, remove_file, write_text
+from quiltcli.formats.whole import link_whole, make_folder, remove_file, sync_folder, write_text
 from quiltcli.geometry import BoolArray, IntArray, facet_from_world
 from quiltcli.images.facets import facet_image, page_of
-from quiltcli.images.metadata import facet_attributes, is_complete, page_attributes, viewer_attributes
+from quiltcli.images.metadata import facet_attributes, page_attributes, viewer_attributes
 from quiltcli.images.names import facet_path, layout_path, quilt_path
 from quiltcli.images.window import cropped, frame_size, tight_window, whole_frame
 from quiltcli.job import PackSpec, dump_job
@@ -61,22 +62,6 @@ def view_files(stage: Stage, out: Outputs, view: View) -> list[Path]:
     return pages * job.quilts + facets * job.facets
 
 
-def view_is_complete(stage: Stage, out: Outputs, view: View) -> bool:
-    """Whether every image of a view is there, whole, and made by this job; one to be skipped may lack."""
-    missing = set(_skipped_files(stage, out, view))
-    return all(
-        is_complete(path, out.job_sha, view.frame) or (path in missing and not path.exists())
-        for path in view_files(stage, out, view)
-    )
-
-
-def _skipped_files(stage: Stage, out: Outputs, view: View) -> Iterator[Path]:
-    """Images of a view that are not to be written, for their facets are not lit."""
-    if stage.job.output.facets and stage.job.output.unlit == "skip":
-        for row in out.rows[~view_lit(stage, view)[out.rows]]:
-            yield facet_path(out.folder, int(stage.layout.facet[row]), *view.file_key)
-
-
 def view_lit(stage: Stage, view: View) -> BoolArray:
     """Facets (F,) whose lit side faces the viewer they belong to."""
     lit = np.zeros(stage.facets.count, dtype=np.bool_)
@@ -109,6 +94,7 @@ def write_settings(stage: Stage, out: Outputs) -> None:
         # Whoever takes the job up from here has the layout, and need not pack again.
         job = job.model_copy(update={"layout": path})
     write_text(out.folder / "job.yaml", dump_job(job, out.folder))
+    sync_folder(out.folder)
 
 
 @dataclass(frozen=True)
@@ -120,7 +106,7 @@ class Drawn:
 
 
 def write_views(stage: Stage, out: Outputs, drawn: Sequence[Drawn], threads: int) -> dict[str, float]:
-    """Write the images of views that share their files, several files at a time.
+    """Write the images of views that share their files, several at a time; then they are on the disk.
 
     Returns:
         Seconds by what was done, those of all threads together.
@@ -134,6 +120,8 @@ def write_views(stage: Stage, out: Outputs, drawn: Sequence[Drawn], threads: int
         for each in [pool.submit(*task) for task in work]:
             for name, seconds in each.result().items():
                 total[name] = total.get(name, 0.0) + seconds
+    for folder in sorted({path.parent for path in view_files(stage, out, drawn[0].view)}):
+        sync_folder(folder)
     return total
 
 
@@ -283,6 +271,9 @@ def _pages_on_disk(stage: Stage, out: Outputs, view: View) -> Iterator[tuple[int
             yield page, Problem(words, str(path))
         elif image.attributes.get("quilt:job") != out.job_sha:
             words = "was made by another job; facets can only be merged into the same job's"
+            yield page, Problem(words, str(path))
+        elif not is_sealed(path):
+            words = "is damaged, or another program has changed it (render the whole frame again)"
             yield page, Problem(words, str(path))
         else:
             yield page, None

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quiltcli.formats.whole import write_text
+from quiltcli.formats.whole import sync_folder, write_text
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -144,11 +144,17 @@ def write_report(path: Path, job_sha: str, version: str, records: Iterable[Frame
             "frames": [frames[key] for key in sorted(frames)],
         }
         write_text(path, json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        sync_folder(path.parent)
 
 
 def _key(entry: Mapping[str, Any]) -> tuple[int, str]:
     """What tells the entry from all others: frame and eye."""
     return entry["frame"], str(entry.get("eye", ""))
+
+
+def known_views(path: Path, job_sha: str) -> set[tuple[int, str]]:
+    """Frame and eye of all that an existing report of the same job has an entry of."""
+    return {_key(entry) for entry in _known_frames(path, job_sha)}
 
 
 def _known_frames(path: Path, job_sha: str) -> list[dict[str, Any]]:

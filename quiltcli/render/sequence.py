@@ -8,20 +8,22 @@ frame → views                           a function of the frame number (`viewe
 
 from __future__ import annotations
 
+import errno
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.errors import JobError, OutputError, QuiltError, ViewerError, raise_all
+from quiltcli.errors import CheckFailedError, JobError, OutputError, QuiltError, ViewerError, raise_all
 from quiltcli.formats.exr.image import use_threads
+from quiltcli.formats.noted import noting_inputs
 from quiltcli.geometry import BoolArray
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.render.buffers import new_buffers
@@ -36,15 +38,17 @@ from quiltcli.render.outputs import (
     outputs,
     read_quilt,
     refuse_to_overwrite,
-    view_is_complete,
     write_settings,
     write_views,
 )
 from quiltcli.render.report import FrameRecord, write_report
+from quiltcli.render.resume import clear_away, unfinished
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.render.workers import Pool, can_fork, shared_buffers, worth_forking
 from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import View, by_file, views_of
+
+_OF_THE_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EIO}
 
 
 @dataclass(frozen=True)
@@ -94,12 +98,14 @@ class Prepared:
         out: where the files go.
         views: what is left to draw.
         only: (F,) the only facets to draw, None for all.
+        inputs: hashes of the files that were read, by absolute path.
     """
 
     stage: Stage
     out: Outputs
     views: tuple[View, ...]
     only: BoolArray | None
+    inputs: Mapping[str, str] = field(default_factory=dict)
 
 
 def render(
@@ -116,7 +122,8 @@ def render(
         The records of the frames that were rendered.
 
     Raises:
-        QuiltError: bad input, found before anything is written, or a file that cannot be written.
+        QuiltError: bad input, found before anything is written.
+        CheckFailedError: a file cannot be written; the frames before it are whole and reported.
         Stopped: a signal came; the frames rendered so far are whole and reported.
     """
     options, listener = options or RenderOptions(), listener or Listener()
@@ -124,9 +131,13 @@ def render(
     ready = prepare(job, options)
     for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
         listener.say(notice)
-    if options.dry_run or not ready.views:
+    if options.dry_run:
         return []
-    write_settings(ready.stage, ready.out)
+    clear_away(ready.stage, ready.out, ready.views)
+    if not ready.views:
+        return []
+    with failing_run(of_the_disk=True):
+        write_settings(ready.stage, ready.out)
     return render_frames(ready, options.threads or default_threads(), listener, start)
 
 
@@ -137,20 +148,22 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
         QuiltError: bad input, or files that are in the way.
     """
     frames = list(job.frames if options.frames is None else options.frames)
-    views_of(job, frames)  # what is wrong with the path is said before anything is loaded
-    stage = set_stage(job, options.folder)
-    views = stage.views(frames)
+    with noting_inputs() as inputs:
+        views_of(job, frames)  # what is wrong with the path is said before anything is loaded
+        stage = set_stage(job, options.folder)
+        job_sha = job_sha256(job)
+        views = stage.views(frames)
     viewers = [viewer for view in views for viewer in view.viewers]
     raise_all(ViewerError, eye_problems(stage.facets, viewers, job))
     only = chosen_facets(stage, options.facets)
-    out = outputs(stage, options.folder or job.output.directory, job_sha256(job), options.facets)
+    out = outputs(stage, options.folder or job.output.directory, job_sha, options.facets)
     if only is not None:
         raise_all(OutputError, merge_problems(stage, out, views))
     elif options.resume:
-        views = [view for view in views if not view_is_complete(stage, out, view)]
+        views = unfinished(stage, out, views, options.threads or default_threads())
     elif not options.overwrite:
         refuse_to_overwrite(stage, out, views)
-    return Prepared(stage, out, tuple(views), only)
+    return Prepared(stage, out, tuple(views), only, inputs)
 
 
 def render_frames(
@@ -171,6 +184,7 @@ def render_frames(
     sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in views[:2]]
     # Forked before this process has threads of its own: a lock that one holds would stay locked.
     with ExitStack() as ends:
+        ends.enter_context(failing_run())
         pool = ends.enter_context(Pool(stage, sheets, threads)) if pooled else None
         listener.begin(len(views))
         request = ends.enter_context(stop_between_frames())
@@ -191,6 +205,24 @@ def render_frames(
         writer.leave(0)
         request.check()
     return writer.records
+
+
+@contextmanager
+def failing_run(*, of_the_disk: bool = False) -> Iterator[None]:
+    """Turn files that cannot be written into a failure of the run, for the input was good.
+
+    Args:
+        of_the_disk: only those that the disk is to blame for, not the user.
+
+    Raises:
+        CheckFailedError: with the problems of an OutputError.
+    """
+    try:
+        yield
+    except OutputError as error:
+        if of_the_disk and getattr(error.__cause__, "errno", None) not in _OF_THE_DISK:
+            raise
+        raise CheckFailedError(error.problems) from error
 
 
 class Writer:

@@ -18,11 +18,13 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from multiprocessing.connection import Connection, wait
+from multiprocessing.util import Finalize
 from operator import itemgetter
 from typing import Any
 
@@ -30,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.channels import exr_channels
+from quiltcli.ending import SIGNALS
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
 from quiltcli.projection.planar import QuiltRays, quilt_rays
@@ -66,7 +69,13 @@ _MANY_TRIANGLES = 50_000
 
 
 def can_fork() -> bool:
-    """Whether this system has processes that share their parent's memory."""
+    """Whether processes can be forked here that share this one's memory.
+
+    Daemonic processes may have no children, and a thread beside the main one is somebody else's
+    program, which may hold locks that would stay locked in a fork.
+    """
+    if multiprocessing.current_process().daemon or threading.current_thread() is not threading.main_thread():
+        return False
     return sys.platform.startswith("linux") and "fork" in multiprocessing.get_all_start_methods()
 
 
@@ -171,16 +180,20 @@ class Pool:
         _ = stage.scene.planes, stage.scene.corner_normals, stage.scene.corner_colors
         if stage.job.render.backface_culling:
             _ = stage.scene.facing
-        context = multiprocessing.get_context("fork")
         self._workers: list[_Worker] = []
         self._known: list[set[int]] = [set() for _ in range(workers)]
-        for _number in range(workers):
-            ours, theirs = context.Pipe()
-            place = _Workplace(stage, buffers, self._arena)
-            process = context.Process(target=_serve, args=(theirs, place, os.getpid()), daemon=True)
-            process.start()
-            theirs.close()
-            self._workers.append(_Worker(process, ours))
+        # Python waits at its end for children that are left, and these are deaf to its signal to end.
+        self._end = Finalize(self, _kill, args=(self._workers,), exitpriority=10)
+        # A signal to the whole group must not find a child that has not yet learned to leave it to us.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+        try:
+            for _number in range(workers):
+                self._workers.append(_forked(_Workplace(stage, buffers, self._arena)))
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        except BaseException:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            self.close()
+            raise
 
     @property
     def workers(self) -> int:
@@ -195,13 +208,7 @@ class Pool:
 
     def close(self) -> None:
         """End the workers, whatever they are doing."""
-        for worker in self._workers:
-            with contextlib.suppress(OSError):
-                worker.connection.close()
-            worker.process.terminate()
-        for worker in self._workers:
-            worker.process.join()
-        self._workers = []
+        self._end()
         self._arrays.close()
 
     def begin(self, stage: Stage) -> None:
@@ -352,10 +359,31 @@ class _Workplace:
         return self._plan
 
 
+def _forked(place: _Workplace) -> _Worker:
+    """A new worker."""
+    context = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs, place, os.getpid()), daemon=True)
+    process.start()
+    theirs.close()
+    return _Worker(process, ours)
+
+
+def _kill(workers: list[_Worker]) -> None:
+    """End workers, whatever they are doing; there will be none in the list."""
+    for worker in workers:
+        with contextlib.suppress(OSError):
+            worker.connection.close()
+        worker.process.kill()
+    while workers:
+        workers.pop().process.join()
+
+
 def _serve(connection: Connection, place: _Workplace, parent: int) -> None:
     """A worker's life: take frames and work, answer; end when the parent is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches everybody; the parent decides
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)  # both may reach a whole group; the parent decides
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     with contextlib.suppress(EOFError, OSError):
         while True:
             while not connection.poll(1.0):

@@ -43,10 +43,13 @@ IMAGES = [
 SETTINGS = ["job.yaml", "layout.yaml", "report.json"]
 
 
-def write_tiny_job(folder: Path) -> Path:
-    """Write the files of the job; returns the job file."""
+def write_tiny_job(folder: Path, page: str = "") -> Path:
+    """Write the files of the job; returns the job file. A page such as `144, 72` spares the packing's search."""
     for name, text in FILES.items():
         (folder / name).write_text(text)
+    if page:
+        layout = f"layout: {{method: maxrects, size: [{page}]}}"
+        replaced(folder, "job.yaml", "scene: scene.yaml", f"scene: scene.yaml\n{layout}")
     return folder / "job.yaml"
 
 

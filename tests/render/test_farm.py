@@ -11,7 +11,8 @@ from click.testing import CliRunner
 from quiltcli.cli import main
 from quiltcli.errors import CheckFailedError, JobError
 from quiltcli.job import job_sha256, load_job
-from quiltcli.render.farm import Task, render_on, render_task
+from quiltcli.render.farm import render_on
+from quiltcli.render.farm_task import Task, render_task
 from quiltcli.render.sequence import Listener, RenderOptions, render
 from quiltcli.viewer.view import views_at
 from tests.helpers.tiny_job import IMAGES, SETTINGS, files_in, replaced, write_tiny_job

@@ -10,11 +10,11 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "quiltcli"
 ORDER = (
-    *("errors", "geometry", "channels", "formats", "job", "display", "scene", "viewer", "layout"),
+    *("ending", "errors", "geometry", "channels", "formats", "job", "display", "scene", "viewer", "layout"),
     *("projection", "visibility", "shading", "images", "render", "calibration", "analysis", "exchange"),
     *("api", "cli", "__main__"),
 )
-LIGHT = {"quiltcli.errors", "quiltcli"}
+LIGHT = {"quiltcli.ending", "quiltcli.errors", "quiltcli"}
 STANDARD = {
     *("__future__", "collections", "contextlib", "dataclasses", "importlib", "os", "pathlib", "sys", "typing")
 }

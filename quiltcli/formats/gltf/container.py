@@ -18,6 +18,7 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from quiltcli.errors import MeshError, Problem
 from quiltcli.formats.gltf.json_values import Json, parse_json
+from quiltcli.formats.noted import note_input
 
 _MAGIC = b"glTF"
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
@@ -83,11 +84,13 @@ class Container:
         try:
             if not stat.S_ISREG(path.stat().st_mode):
                 raise uri.error(f"{_short(text)} is not a file")
-            return path.read_bytes()
+            data = path.read_bytes()
         except FileNotFoundError:
             raise uri.error(f"{_short(text)} is missing beside it") from None
         except OSError as error:
             raise uri.error(f"{_short(text)} cannot be read: {error.strerror}") from None
+        note_input(path, data)
+        return data
 
     def beside(self, uri: Json) -> Path:
         """Path of the file a relative URI names; `%20` in it is a space."""
@@ -104,6 +107,8 @@ class Container:
             return as_written if not path.is_file() and as_written.is_file() else path
         except OSError as error:
             raise uri.error(f"{_short(text)} cannot be read: {error.strerror}") from None
+        note_input(path, data)
+        return data
 
 
 def files_beside(path: Path) -> list[Path]:
@@ -175,11 +180,13 @@ def _file_bytes(path: Path) -> bytes:
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             raise _error(path, "is not a file (expected glTF)")
-        return path.read_bytes()
+        data = path.read_bytes()
     except FileNotFoundError:
         raise _error(path, "no such file (expected a mesh)") from None
     except OSError as error:
         raise _error(path, f"cannot be read: {error.strerror}") from None
+    note_input(path, data)
+    return data
 
 
 def _error(path: Path, message: str) -> MeshError:

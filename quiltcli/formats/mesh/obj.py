@@ -29,6 +29,7 @@ from quiltcli.formats.mesh.words import (
     ragged,
     statements,
 )
+from quiltcli.formats.noted import note_input
 from quiltcli.geometry import Float32Array, FloatArray, IntArray, segments
 
 _CORNER = re.compile(r"[-+]?\d+(/([-+]?\d+)?){0,2}", re.ASCII)
@@ -324,9 +325,12 @@ def _materials(
         for name in _libraries(_rest(file, row), path.parent):
             try:
                 place = path.parent / name.replace("\\", "/")
-                found.update(read_mtl(place.read_bytes(), place.parent))
+                data = place.read_bytes()
+                found.update(read_mtl(data, place.parent))
             except (OSError, ValueError):  # the latter for a zero byte in the name
                 missing.append(name)
+            else:
+                note_input(place, data)
     number: dict[str, int] = {}
     rows = [number.setdefault(_rest(file, row), len(number)) for row in used.tolist()]
     materials = tuple(

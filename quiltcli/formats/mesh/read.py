@@ -14,6 +14,7 @@ from quiltcli.formats.mesh.obj import read_obj
 from quiltcli.formats.mesh.off import read_off
 from quiltcli.formats.mesh.ply import read_ply
 from quiltcli.formats.mesh.stl import read_stl
+from quiltcli.formats.noted import note_input
 
 READERS: Mapping[str, Callable[[bytes, Path], PolygonMesh]] = {
     ".obj": read_obj,
@@ -56,13 +57,15 @@ def read_polygons(path: Path) -> PolygonMesh:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        data = path.read_bytes()
     except FileNotFoundError:
         raise _error(path, "no such file (expected a mesh)") from None
     except IsADirectoryError:
         raise _error(path, "is a directory (expected a mesh file)") from None
     except OSError as error:
         raise _error(path, f"cannot be read: {error.strerror}") from None
+    note_input(path, data)
+    return data
 
 
 def _error(path: Path, message: str) -> MeshError:

@@ -13,6 +13,7 @@ from yaml.reader import Reader, ReaderError
 from yaml.scanner import Scanner
 
 from quiltcli.errors import JobError, Problem
+from quiltcli.formats.noted import note_input
 from quiltcli.formats.yaml.core import CoreResolver
 
 
@@ -41,6 +42,7 @@ def read_text(path: Path) -> str:
         raise JobError(Problem("is a directory (a file was expected)", str(path))) from None
     except OSError as error:
         raise JobError(Problem(f"cannot be read: {error.strerror or error}", str(path))) from None
+    note_input(path, raw)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

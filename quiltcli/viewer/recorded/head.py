@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 from quiltcli.errors import ViewerError
+from quiltcli.formats.noted import round_of_notes
 from quiltcli.geometry import FloatArray
 from quiltcli.job import RecordedSpec
 from quiltcli.viewer.recorded.clean import Cleaned, Run, clean
@@ -52,11 +53,11 @@ def read_head(spec: RecordedSpec) -> Head:
         QuiltError: the file cannot be read, or is not what the job says it is.
     """
     stat = spec.file.stat() if spec.file.is_file() else None
-    return _read(spec, stat.st_mtime_ns if stat else 0, stat.st_size if stat else 0)
+    return _read(spec, stat.st_mtime_ns if stat else 0, stat.st_size if stat else 0, round_of_notes())
 
 
 @lru_cache(maxsize=8)
-def _read(spec: RecordedSpec, changed: int, size: int) -> Head:
+def _read(spec: RecordedSpec, changed: int, size: int, notes: int) -> Head:
     take = place(settle(read_recording(spec), spec), spec)
     cleaned = clean(take, spec.gaps)
     runs = tuple(filtered(run, spec.filter, cleaned.step, straight=take.is_curve) for run in cleaned.runs)

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import Problem, ViewerError, raise_all
+from quiltcli.formats.noted import round_of_notes
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.job.model import suggest
 from quiltcli.viewer.recorded import quaternions
@@ -72,11 +73,11 @@ def read_track(path: Path) -> Track:
         ViewerError: with every bad row of the file.
     """
     stat = path.stat() if path.is_file() else None
-    return _read(path, stat.st_mtime_ns if stat else 0, stat.st_size if stat else 0)
+    return _read(path, stat.st_mtime_ns if stat else 0, stat.st_size if stat else 0, round_of_notes())
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, changed: int, size: int) -> Track:
+def _read(path: Path, changed: int, size: int, notes: int) -> Track:
     lines = take_lines(path)
     dialect = dialect_of(lines)
     if dialect.separator not in (",", ";"):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.formats.noted import note_input
 from quiltcli.geometry import FloatArray
 from quiltcli.job import RecordedSpec
 from quiltcli.viewer.recorded import quaternions
@@ -29,6 +30,7 @@ def read_freed(spec: RecordedSpec) -> Recording:
     """
     check_size(spec.file)
     data = spec.file.read_bytes()
+    note_input(spec.file, data)
     packets, times = _captured(data) if data[:4] in _PCAP else (_bare(data), None)
     right = (packets.sum(axis=1) & 0xFF) == 0x40
     if not right.any():
