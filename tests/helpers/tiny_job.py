@@ -44,7 +44,7 @@ SETTINGS = ["job.yaml", "layout.yaml", "report.json"]
 
 
 def write_tiny_job(folder: Path, page: str = "") -> Path:
-    """Write the files of the job; returns the job file. A page such as `144, 72` spares packing's search."""
+    """Write the files of the job; returns the job file. A page such as `144, 72` spares a search."""
     for name, text in FILES.items():
         (folder / name).write_text(text)
     if page:
