@@ -217,7 +217,7 @@ def test_a_folder_that_goes_is_a_failure_of_the_run(tmp_path: Path, monkeypatch:
     def gone(record: object) -> None:
         (out / "quilt").rename(tmp_path / "elsewhere")
 
-    with pytest.raises(CheckFailedError, match="out/quilt.*: cannot be written: No such file"):
+    with pytest.raises(CheckFailedError, match=r"out/quilt.*: cannot be written: No such file"):
         render(load_job(job), RenderOptions(threads=1), Listener(frame_done=gone))
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
