@@ -107,8 +107,6 @@ class Container:
             return as_written if not path.is_file() and as_written.is_file() else path
         except OSError as error:
             raise uri.error(f"{_short(text)} cannot be read: {error.strerror}") from None
-        note_input(path, data)
-        return data
 
 
 def files_beside(path: Path) -> list[Path]:
