@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from quiltcli.errors import JobError, Problem
+from quiltcli.formats.inputs import check_input
 from quiltcli.formats.yaml.source import Source, YamlFile, parse_yaml
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.job import JobFile
@@ -54,9 +55,7 @@ def load_scene_file(path: Path | str) -> SceneFile:
     """
     path = Path(path)
     if path.suffix.lower() in MESHES:
-        if not path.is_file():
-            what = "is a directory (a mesh was expected)" if path.is_dir() else "no such file"
-            raise JobError(Problem(what, str(path)))
+        check_input(path, JobError, "a mesh")
         scene = SceneFile(objects=(ObjectSpec(mesh=path),))
         attach(scene, Source(path))
         return scene

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from quiltcli.errors import JobError, Problem
-from quiltcli.formats.yaml.source import Key, Source, parse_value
+from quiltcli.formats.yaml.source import Key, Source, parse_value, shorten
 from quiltcli.job.model import PathText, describe
 
 
@@ -23,7 +23,7 @@ def apply_sets(data: dict[Any, Any], source: Source, sets: Sequence[str]) -> Sou
     origins, marks = dict(source.origins), dict(source.marks)
     problems: list[Problem] = []
     for text in sets:
-        option = f"--set {text}"
+        option = f"--set {shorten(text, 200)}"
         try:
             key = _apply(data, text)
             origins = {path: by for path, by in origins.items() if path[: len(key)] != key} | {key: option}

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 from typing import Any
 
@@ -88,9 +89,41 @@ def test_message(raw: bytes, expected: str, tmp_path: Path) -> None:
     assert message(tmp_path, raw) == expected
 
 
-def test_aliases_do_not_fill_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("quiltcli.formats.yaml.source._MAX_VALUES", 10_000)
-    assert message(tmp_path, _BOMB).endswith(": aliases expand without end")
+_MERGES = b"a0: &a0 {x: 1}\n" + b"".join(
+    b"a%d: &a%d {k%d: 1, <<: [%s]}\n" % (n, n, n, b", ".join([b"*a%d" % (n - 1)] * 10)) for n in range(1, 12)
+)
+_FLAT_MERGES = (
+    b"base: &b {" + b",".join(b"k%d: 1" % n for n in range(2000)) + b"}\n"
+    + b"".join(b"m%d: {<<: *b}\n" % n for n in range(2000))
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("bomb", [_BOMB, _MERGES, _FLAT_MERGES])
+def test_aliases_and_merges_do_not_fill_the_memory(tmp_path: Path, bomb: bytes) -> None:
+    start = time.process_time()
+    found = message(tmp_path, bomb)
+    assert found.endswith(": aliases stand for more than 100,000 values (write them out, or use fewer)")
+    assert time.process_time() - start < 5
+
+
+def test_many_values_that_are_written_out_are_no_bomb(tmp_path: Path) -> None:
+    assert len(read(tmp_path, b"a: [" + b"1," * 150_000 + b"1]")["a"]) == 150_001
+
+
+@pytest.mark.parametrize(
+    ("raw", "expected"),
+    [
+        (b"a: " + b"9" * 5000, f"a.yaml:1:4: a: '{'9' * 39}…' has too many digits for a number"),
+        (b"a: 0x" + b"f" * 5000, f"a.yaml:1:4: a: '0x{'f' * 37}…' has too many digits for a number"),
+    ],
+)
+def test_numbers_longer_than_any_that_is_meant(raw: bytes, expected: str, tmp_path: Path) -> None:
+    assert message(tmp_path, raw) == expected
+
+
+def test_a_value_typed_by_hand_may_not_nest_without_end() -> None:
+    with pytest.raises(JobError, match="nested too deeply"):
+        parse_value("[" * 500 + "]" * 500)
 
 
 def test_missing_file_and_directory(tmp_path: Path) -> None:

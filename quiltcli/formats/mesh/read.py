@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import MeshError, Problem
+from quiltcli.formats.inputs import read_input
 from quiltcli.formats.mesh.gltf import read_gltf_mesh
 from quiltcli.formats.mesh.mesh import PolygonMesh, check_display_mesh
 from quiltcli.formats.mesh.obj import read_obj
 from quiltcli.formats.mesh.off import read_off
 from quiltcli.formats.mesh.ply import read_ply
 from quiltcli.formats.mesh.stl import read_stl
-from quiltcli.formats.noted import note_input
 
 READERS: Mapping[str, Callable[[bytes, Path], PolygonMesh]] = {
     ".obj": read_obj,
@@ -52,20 +52,7 @@ def read_polygons(path: Path) -> PolygonMesh:
         MeshError: the file is missing or broken. All problems at once.
     """
     with np.errstate(all="ignore"):  # the numbers of a file may be anything
-        return READERS[path.suffix.lower()](_bytes(path), path)
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise _error(path, "no such file (expected a mesh)") from None
-    except IsADirectoryError:
-        raise _error(path, "is a directory (expected a mesh file)") from None
-    except OSError as error:
-        raise _error(path, f"cannot be read: {error.strerror}") from None
-    note_input(path, data)
-    return data
+        return READERS[path.suffix.lower()](read_input(path, MeshError, "a mesh"), path)
 
 
 def _error(path: Path, message: str) -> MeshError:

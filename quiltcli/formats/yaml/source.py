@@ -18,7 +18,9 @@ from quiltcli.formats.yaml.core import CORE
 from quiltcli.formats.yaml.syntax import compose, place, read_text
 
 Key: TypeAlias = tuple[str | int, ...]
-_MAX_VALUES = 5_000_000
+# Values that may come from aliases and merges, over a whole file; what is written out may be any number.
+_MAX_ALIASED = 100_000
+_MAX_DIGITS = 300
 
 
 @dataclass(frozen=True)
@@ -123,10 +125,7 @@ def parse_text(text: str, path: Path) -> YamlFile:
         kind = "a list" if isinstance(root, yaml.SequenceNode) else f"the text {shorten(root.value)!r}"
         raise JobError(Problem(f"expected 'key: value' lines, got {kind}", str(path), line, column))
     walker = _Walker(str(path))
-    try:
-        data = walker.value(root, (), None)
-    except RecursionError:
-        raise JobError(Problem("the values are nested too deeply", str(path))) from None
+    data = walker.whole(root)
     return YamlFile(data, Source(path, walker.marks), walker.problems)
 
 
@@ -138,7 +137,7 @@ def parse_value(text: str) -> Any:
     """
     root = compose(text, Path())
     walker = _Walker("")
-    data = None if root is None else walker.value(root, (), None)
+    data = None if root is None else walker.whole(root)
     if walker.problems:
         raise JobError(walker.problems)
     return data
@@ -149,6 +148,13 @@ def shorten(text: str, length: int = 40) -> str:
     return text if len(text) <= length else text[: length - 1] + "…"
 
 
+def _whole_number(text: str) -> int:
+    """An int of a plausible size: Python itself refuses to write out numbers of thousands of digits."""
+    if len(text) > _MAX_DIGITS:
+        raise ValueError
+    return int(text, 0 if text[:2] in ("0o", "0x") else 10)
+
+
 class _Walker:
     """Turns nodes into plain data and notes where each value stands."""
 
@@ -156,7 +162,7 @@ class _Walker:
         "str": str,
         "null": lambda text: None,
         "bool": lambda text: text.lower() == "true",
-        "int": lambda text: int(text, 0 if text[:2] in ("0o", "0x") else 10),
+        "int": _whole_number,
         "float": lambda text: float(text.lower().replace(".inf", "inf").replace(".nan", "nan")),
     }
 
@@ -165,15 +171,24 @@ class _Walker:
         self.marks: dict[Key, Mark] = {}
         self.problems: list[Problem] = []
         self.open: set[int] = set()
+        self.seen: set[int] = set()
+        self.aliased = 0
+
+    def whole(self, root: yaml.Node) -> Any:
+        """Plain data of a document (JobError when it is too deep, or its aliases too many)."""
+        try:
+            return self.value(root, (), None)
+        except RecursionError:
+            raise JobError(Problem("the values are nested too deeply", self.file)) from None
 
     def value(self, node: yaml.Node, path: Key, key: yaml.Node | None, *, in_list: bool = False) -> Any:
         """Plain data of a node; a value that cannot be had is a problem and becomes None."""
         self.marks[path] = self._mark(node, key, in_list)
+        self._count(node)
         if isinstance(node, yaml.ScalarNode):
             return self._scalar(node, path)
-        if id(node) in self.open or len(self.marks) > _MAX_VALUES:
-            inside = "an alias refers to itself" if id(node) in self.open else "aliases expand without end"
-            raise JobError(Problem(inside, self.file, *self.marks[path].value))
+        if id(node) in self.open:
+            raise JobError(Problem("an alias refers to itself", self.file, *self.marks[path].value))
         self.open.add(id(node))
         try:
             if isinstance(node, yaml.SequenceNode):
@@ -181,6 +196,16 @@ class _Walker:
             return self._mapping(node, path) if isinstance(node, yaml.MappingNode) else None
         finally:
             self.open.discard(id(node))
+
+    def _count(self, node: yaml.Node) -> None:
+        """Count a value met again: a file of a few hundred bytes can stand for more than memory holds."""
+        if id(node) not in self.seen:
+            self.seen.add(id(node))
+            return
+        self.aliased += 1
+        if self.aliased > _MAX_ALIASED:
+            words = f"aliases stand for more than {_MAX_ALIASED:,} values (write them out, or use fewer)"
+            raise JobError(Problem(words, self.file, *place(node.start_mark)))
 
     def _mark(self, node: yaml.Node, key: yaml.Node | None, in_list: bool) -> Mark:
         """Place to point at: a block or an empty value is best shown by its key."""
@@ -198,6 +223,8 @@ class _Walker:
             words = f"the tag {node.tag.replace(CORE, '!!')!r} is not understood (write a plain value)"
         except ValueError:
             words = f"{shorten(node.value)!r} is no {node.tag.removeprefix(CORE)}"
+            if node.tag == CORE + "int" and len(node.value) > _MAX_DIGITS:
+                words = f"{shorten(node.value)!r} has too many digits for a number"
         self._problem(node, path, words)
         return None
 

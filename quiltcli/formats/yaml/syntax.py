@@ -13,7 +13,7 @@ from yaml.reader import Reader, ReaderError
 from yaml.scanner import Scanner
 
 from quiltcli.errors import JobError, Problem
-from quiltcli.formats.noted import note_input
+from quiltcli.formats.inputs import read_input
 from quiltcli.formats.yaml.core import CoreResolver
 
 
@@ -32,17 +32,9 @@ def read_text(path: Path) -> str:
     """Text of a UTF-8 file.
 
     Raises:
-        JobError: the file is missing, a directory, unreadable or not UTF-8.
+        JobError: the file is missing, no regular file, unreadable or not UTF-8.
     """
-    try:
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        raise JobError(Problem("no such file", str(path))) from None
-    except IsADirectoryError:
-        raise JobError(Problem("is a directory (a file was expected)", str(path))) from None
-    except OSError as error:
-        raise JobError(Problem(f"cannot be read: {error.strerror or error}", str(path))) from None
-    note_input(path, raw)
+    raw = read_input(path, JobError)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

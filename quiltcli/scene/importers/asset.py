@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from quiltcli.errors import MeshError, Problem, SceneError
+from quiltcli.formats.inputs import open_input
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.formats.mesh.read import READERS, read_polygons
@@ -91,17 +92,10 @@ def _gltf_asset(path: Path) -> Asset:
 
 def _check_file(path: Path) -> None:
     suffix = path.suffix.lower()
-    if path.is_dir():
-        raise SceneError(Problem("is a directory (expected a mesh file)", str(path)))
     if suffix not in SUFFIXES:
         found = f"unknown mesh format {path.suffix!r}" if suffix else "a mesh file without a suffix"
         raise SceneError(Problem(f"{found} (expected {', '.join(SUFFIXES)})", str(path)))
-    try:
-        with path.open("rb") as file:
-            empty = not file.read(1)
-    except FileNotFoundError:
-        raise SceneError(Problem("no such file (expected a mesh)", str(path))) from None
-    except OSError as error:
-        raise SceneError(Problem(f"cannot be read: {error.strerror}", str(path))) from None
+    with open_input(path, SceneError, "a mesh") as file:
+        empty = not file.read(1)
     if empty:
         raise SceneError(Problem("the file is empty (expected a mesh)", str(path)))
