@@ -31,6 +31,7 @@ from quiltcli.job import (
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
+from quiltcli.render.needs import demand_memory
 from quiltcli.scene import load_scene
 from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import view_problems, viewers_of
@@ -144,7 +145,9 @@ def _check_job(findings: _Findings, path: Path) -> None:
     findings.problems += found
     facets = findings.facets(job.display)
     choice = job.layout or (load_display_file(job.display).layout if facets else None) or PackSpec()
-    findings.run(layout_for, choice, facets, layout_path(job.output.directory))
+    placed = findings.run(layout_for, choice, facets, layout_path(job.output.directory))
+    if placed is not None:
+        findings.run(demand_memory, job, placed)
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
     findings.scene(job.scene, findings.run(load_scene_file, job.scene))

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, Wit
 from quiltcli import geometry
 from quiltcli.job.layout import UvLayoutSpec
 from quiltcli.job.model import (
+    FARTHEST,
     Complaint,
     Count,
     Direction,
@@ -39,7 +40,9 @@ def _units(value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise complaint(f"expected m, cm, mm, in, ft or a number of metres, got {describe(value)}")
     if not 0 < value < float("inf"):
-        raise complaint(f"must be greater than 0 and finite, got {value}")
+        raise complaint(f"must be greater than 0 and finite, got {describe(value)}")
+    if not 1 / FARTHEST <= value <= FARTHEST:
+        raise complaint(f"must be from 1e-09 to 1e+09 metres, got {describe(value)}")
     return float(value)
 
 

@@ -41,8 +41,12 @@ COMPRESSIONS = (
 CLIPS = ("auto", "planar", "distance")
 STEREO = ("files", "parts")
 _NAME = re.compile(r"[\w-]+")
+MOST_SAMPLES = 4096
+MOST_BLEED = 4096
 UNLIT = ("write", "link", "skip")
 DATA_WINDOWS = ("full", "tight")
+_FRACTION = re.compile(r"[-+]?\d{1,9}(\.\d{0,9}|/\d{1,9})?")
+_LONGEST = 1_000_000_000
 # Decimal rates that stand for fractions in film and television.
 _NTSC = {23.98: 24, 23.976: 24, 29.97: 30, 47.95: 48, 47.952: 48, 59.94: 60, 119.88: 120}
 
@@ -54,13 +58,16 @@ def _rate(value: Any) -> Fraction:
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise wrong
     try:
-        rate = Fraction(value)
+        # An exponent is a power that Fraction would work out, however long that takes.
+        rate = Fraction(value if not isinstance(value, str) or _FRACTION.fullmatch(value) else "none")
     except (ValueError, ZeroDivisionError, OverflowError):
         raise wrong from None
     if isinstance(value, float):
         rate = Fraction(_NTSC[value] * 1000, 1001) if value in _NTSC else rate.limit_denominator(1001)
     if rate <= 0:
         raise complaint(f"must be greater than 0, got {value}")
+    if not Fraction(1, 1000) <= rate <= 1_000_000 or rate.denominator > _LONGEST:
+        raise complaint(f"must be from 0.001 to 1000000 frames a second, got {describe(value)}")
     return rate
 
 
@@ -98,7 +105,7 @@ def _bits(value: Any) -> Any:
 class RenderSpec(Model):
     """How pixels are made."""
 
-    samples: Count = 1
+    samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
     method: Annotated[str, OneOf(METHODS)] = "homography"
     """Render method."""
@@ -113,7 +120,7 @@ class RenderSpec(Model):
     planar where depth is planar and every lit pixel of every frame lies ahead of the eye (auto)."""
     backface_culling: bool = False
     """Drop triangles that face away from the viewer."""
-    bleed: Natural = 2
+    bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:

@@ -152,7 +152,12 @@ def _mapping(value: Any, ctx: dict[str, Any]) -> str:
 
 
 def _limit(words: str, name: str) -> Callable[[Any, dict[str, Any]], str]:
-    return lambda value, ctx: f"must be {words} {ctx[name]:g}, got {value}"
+    return lambda value, ctx: f"must be {words} {_plain(ctx[name])}, got {describe(value)}"
+
+
+def _plain(limit: float) -> str:
+    """A limit as it would be typed."""
+    return f"{limit:.0f}" if abs(limit) < 1e13 and limit == int(limit) else f"{limit:g}"
 
 
 def _literal(value: Any, ctx: dict[str, Any]) -> str:

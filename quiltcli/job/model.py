@@ -25,6 +25,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 from pydantic_core import core_schema as cs
 
+from quiltcli.formats.inputs import name_fault
 from quiltcli.formats.yaml.source import Source, shorten
 
 # A path below a model, and what is wrong with the value there.
@@ -195,15 +196,26 @@ def _nonzero(value: tuple[float, float, float]) -> tuple[float, float, float]:
     return value
 
 
+def _not_tiny(value: float) -> float:
+    if value < 1e-9:
+        raise complaint(f"must be at least 1e-09, got {describe(value)}")
+    return value
+
+
 # YAML has lists, the models tuples, which nobody can change.
 Listed = BeforeValidator(_as_tuple)
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0)]
+# A million kilometres: beyond it the squares of lengths leave single precision, and no display is so large.
+FARTHEST = 1e9
+LARGEST_WHOLE = 2**31 - 1
+
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST)]
+Positive = Annotated[float, Field(allow_inf_nan=False, gt=0, le=1e12), AfterValidator(_not_tiny)]
+NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0, le=FARTHEST)]
 Unit = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
-Count = Annotated[int, Field(ge=1)]
-Natural = Annotated[int, Field(ge=0)]
+Count = Annotated[int, Field(ge=1, le=LARGEST_WHOLE)]
+Natural = Annotated[int, Field(ge=0, le=LARGEST_WHOLE)]
+FrameNumber = Annotated[int, Field(ge=-999_999_999, le=999_999_999)]
 Pixels = Annotated[int, Field(ge=1, le=1_000_000)]
 Vec3 = Annotated[tuple[Number, Number, Number], Items(3)]
 Direction = Annotated[tuple[Number, Number, Number], Items(3), AfterValidator(_nonzero)]
@@ -221,10 +233,14 @@ def located(value: Any, info: ValidationInfo) -> Path:
     """Path of a file named in YAML, relative to the YAML file's folder."""
     if not isinstance(value, (str, Path)) or not str(value):
         raise complaint(f"expected a file name, got {describe(value)}")
+    if fault := name_fault(value):
+        raise complaint(fault)
     base = (info.context or {}).get("base")
     if base is None or isinstance(value, PathText):
         return Path(value)
     path = Path(base) / value
+    if name_fault(path):
+        raise complaint(name_fault(path))
     tidy = Path(os.path.normpath(path))
     # "a/../b" is not "b" where a is a symbolic link to another place.
     return tidy if not path.exists() or (tidy.exists() and tidy.samefile(path)) else path
@@ -258,6 +274,8 @@ class ExistingFile:
             raise complaint(f"{path} is a directory (expected {self.what})")
         if not path.exists():
             raise complaint(f"no such file: {path}{nearest_file(path)}")
+        if not path.is_file():
+            raise complaint(f"{path} is no regular file (expected {self.what})")
         return path
 
 

@@ -22,6 +22,7 @@ from quiltcli.job.model import (
     Complaint,
     Direction,
     ExistingFile,
+    FrameNumber,
     Items,
     Listed,
     Model,
@@ -90,7 +91,7 @@ def _turning(value: tuple[float, float, float, float]) -> tuple[float, float, fl
 class KeyframeSpec(Model):
     """The pose at one frame."""
 
-    frame: int
+    frame: FrameNumber
     """Frame number."""
     position: Vec3
     """Place of the eye, metres."""
@@ -136,13 +137,13 @@ class OrbitSpec(Model):
     """Angle of the eye over the horizon as seen from the centre, instead of `height`."""
     start_deg: Number = 0.0
     """Angle at the first frame: 0 stands on the +Z side, 90 on the +X side."""
-    start_frame: int = 1
+    start_frame: FrameNumber = 1
     """Frame at which the eye is at `start_deg`."""
     frames_per_turn: Annotated[Number, AfterValidator(_nonzero)] | None = None
     """Frames for a whole turn, for ever; negative turns the other way."""
     end_deg: Number | None = None
     """Angle at `end_frame`, instead of whole turns; the eye rests before and after."""
-    end_frame: int | None = None
+    end_frame: FrameNumber | None = None
     """Frame at which the eye is at `end_deg`."""
     look_at: Vec3 | None = None
     """Point that is looked at, the centre when absent, metres."""

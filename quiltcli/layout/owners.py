@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.errors import LayoutError
+from quiltcli.formats.capacity import bytes_text, free_memory
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, segments
 from quiltcli.layout.layout import Layout, quilt_polygons
 from quiltcli.layout.spans import Spans, facet_spans, overlaps, snapped
@@ -31,8 +32,9 @@ def pixel_owners(layout: Layout, bleed: float = 0) -> Owners:
         on its page, the lowest id among equals.
 
     Raises:
-        LayoutError: two facets claim one pixel.
+        LayoutError: two facets claim one pixel, or memory cannot hold so many.
     """
+    demand_memory(layout, owner_bytes(layout))
     spans = facet_spans(layout)
     if overlaps(spans):
         raise LayoutError(layout.problem("facets overlap in the quilt"))
@@ -42,9 +44,22 @@ def pixel_owners(layout: Layout, bleed: float = 0) -> Owners:
     return owners
 
 
+def owner_bytes(layout: Layout) -> int:
+    """Bytes that the owner of a pixel takes."""
+    return 2 if layout.facet.max(initial=0) < np.iinfo(np.int16).max else 4
+
+
+def demand_memory(layout: Layout, pixel_bytes: int) -> None:
+    """Raise a LayoutError unless so many bytes for every pixel of the pages fit into free memory."""
+    pixels, free = int(layout.page_offset[-1]), free_memory()
+    if free is not None and pixels * pixel_bytes > free:
+        words = f"the pages have {pixels:,} pixels, which take {bytes_text(pixels * pixel_bytes)} of memory"
+        raise LayoutError(layout.problem(f"{words}, but {bytes_text(free)} are free (expected smaller pages)"))
+
+
 def _fill_runs(layout: Layout, spans: Spans) -> Owners:
     """Facet ids inside the runs, 0 between them: runs and gaps in turn, each repeated to its length."""
-    small = layout.facet.max(initial=0) < np.iinfo(np.int16).max
+    small = owner_bytes(layout) == 2
     ends = np.zeros(2 * spans.start.size + 2, dtype=np.int64)
     ends[1:-1:2], ends[2:-1:2], ends[-1] = spans.start, spans.stop, layout.page_offset[-1]
     values = np.zeros(ends.size - 1, dtype=np.int32)

@@ -15,6 +15,7 @@ from quiltcli.images.names import layout_path
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
+from quiltcli.render.needs import demand_memory
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.source import SceneSource
 from quiltcli.viewer.clip import settled_clip
@@ -77,6 +78,7 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     kept = layout_path(folder or job.output.directory)
     facets = load_display(load_display_file(job.display))
     layout = layout_for(job.layout or PackSpec(), facets, kept)
+    demand_memory(job, layout)
     return stage_of(job, facets, layout, load_scene(load_scene_file(job.scene)), job.render.bleed)
 
 

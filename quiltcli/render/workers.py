@@ -87,7 +87,11 @@ def worth_forking(stage: Stage) -> bool:
 def shared_array(length: int, dtype: Any) -> NDArray[Any]:
     """Zeros that forked processes write to together; freed with the last of them."""
     dtype = np.dtype(dtype)
-    return np.frombuffer(mmap.mmap(-1, max(length * dtype.itemsize, 1)), dtype=dtype, count=length)
+    try:
+        memory = mmap.mmap(-1, max(length * dtype.itemsize, 1))
+    except OSError as error:
+        raise MemoryError(str(error)) from error
+    return np.frombuffer(memory, dtype=dtype, count=length)
 
 
 def shared_buffers(stage: Stage) -> Buffers:

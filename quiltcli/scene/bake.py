@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, dot, normalized
+from quiltcli.job.model import FARTHEST
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.normals import CREASE_DEG, corner_sums, face_normals, smoothed
 
@@ -26,7 +27,7 @@ class Baked:
         colors: (V, 3) linear, or None where no part has any.
         flat: whether triangles are shaded with their own normals.
         part: (T,) index of the part each triangle came from.
-        infinite: triangles dropped for a NaN or infinite vertex.
+        infinite: triangles dropped for a vertex that is NaN, infinite or beyond `FARTHEST`.
         empty: triangles dropped for having no area.
         uv: (V, 2) texture coordinates, NaN where a part has none, or None where no part has any.
         source: (V,) the vertex of the joined parts each one is a copy of.
@@ -61,6 +62,8 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
     owner = np.repeat(np.arange(len(parts)), [len(part.triangles) for part in parts])
     infinite, empty = _broken(vertices, triangles)
     keep = np.flatnonzero(~(infinite | empty))
+    # No triangle that is kept has such a vertex, but sums over all vertices would meet it.
+    vertices = np.where((np.abs(vertices) <= FARTHEST).all(axis=1)[:, None], vertices, 0.0)
     triangles, owner = triangles[keep], owner[keep]
 
     given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
@@ -124,7 +127,7 @@ def _broken(vertices: FloatArray, triangles: IntArray) -> tuple[BoolArray, BoolA
         length = dot(edges, edges).max(axis=1)
         normal = face_normals(vertices, triangles)
         area = np.sqrt(dot(normal, normal))
-        infinite = ~(np.isfinite(points).all(axis=(1, 2)) & np.isfinite(area))
+        infinite = ~((np.abs(points) <= FARTHEST).all(axis=(1, 2)) & np.isfinite(area))
         return infinite, ~infinite & ~(area > _THINNEST * length)
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from quiltcli.geometry import Float32Array
+from quiltcli.job.model import FARTHEST
 from quiltcli.scene.scene import Materials
 
 
@@ -68,11 +70,17 @@ class Surface:
 def material_table(surfaces: Sequence[Surface]) -> Materials:
     """The table of M surfaces, one row each, in float32."""
     return Materials(
-        color=np.array([s.color for s in surfaces], dtype=np.float32).reshape(-1, 3),
-        metallic=np.array([s.metallic for s in surfaces], dtype=np.float32),
-        roughness=np.array([s.roughness for s in surfaces], dtype=np.float32),
-        emission=np.array([s.emission for s in surfaces], dtype=np.float32).reshape(-1, 3),
+        color=_plausible([s.color for s in surfaces]).reshape(-1, 3),
+        metallic=_plausible([s.metallic for s in surfaces], 1.0),
+        roughness=_plausible([s.roughness for s in surfaces], 1.0),
+        emission=_plausible([s.emission for s in surfaces]).reshape(-1, 3),
         unlit=np.array([s.unlit for s in surfaces], dtype=np.bool_),
-        specular=np.array([s.specular for s in surfaces], dtype=np.float32),
+        specular=_plausible([s.specular for s in surfaces], 1.0),
         textures=tuple(s.textures for s in surfaces),
     )
+
+
+def _plausible(values: Sequence[Any], most: float = FARTHEST) -> Float32Array:
+    """Values of mesh files within what light can be: not negative, not beyond `most`, 0 for what is no number."""
+    found = np.nan_to_num(np.array(values, dtype=np.float64), nan=0.0, posinf=most)
+    return np.clip(found, 0.0, most).astype(np.float32)

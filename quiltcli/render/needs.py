@@ -1,0 +1,55 @@
+"""What a job takes of the machine, said before anything is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from quiltcli.errors import JobError
+from quiltcli.formats.capacity import bytes_text, free_disk, free_memory
+from quiltcli.job import JobFile
+from quiltcli.layout import Layout
+from quiltcli.layout.owners import owner_bytes
+from quiltcli.shading.aovs import exr_channels
+
+
+def demand_memory(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> None:
+    """Raise unless the quilt's buffers fit into the memory that is free.
+
+    Args:
+        job: says which channels there are.
+        layout: says how many pixels.
+        frames: the frames to draw, the job's by default; of two or more, two are in memory at a time.
+
+    Raises:
+        JobError: they do not; the sentence says how much is needed and what would need less.
+    """
+    pixels, free = int(layout.page_offset[-1]), free_memory()
+    sheets = min(len(job.frames if frames is None else frames), 2)
+    needed = pixels * (owner_bytes(layout) + sheets * pixel_bytes(job))
+    if free is None or needed <= free:
+        return
+    pages = "page" if len(layout.pages) == 1 else f"{len(layout.pages)} pages"
+    words = f"the quilt's {pages} of {pixels:,} pixels in all would take {bytes_text(needed)} of memory"
+    raise JobError(
+        layout.problem(f"{words}, but {bytes_text(free)} are free (smaller pages or fewer channels take less)")
+    )
+
+
+def pixel_bytes(job: JobFile) -> int:
+    """Bytes a pixel of all the channels that the job asks for."""
+    return sum(np.dtype(dtype).itemsize for dtype, _ in exr_channels(job.output.channels).values())
+
+
+def disk_warnings(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> Iterator[str]:
+    """A sentence when the images, not compressed, are larger than the disk has room for."""
+    pixels = int(layout.page_offset[-1]) * job.output.quilts
+    pixels += int(layout.size.astype(np.int64).prod(axis=1)[layout.page >= 0].sum()) * job.output.facets
+    count = len(job.frames if frames is None else frames)
+    needed, free = count * pixels * pixel_bytes(job), free_disk(job.output.directory)
+    if free is not None and needed > free:
+        yield (
+            f"the images of {count:,} frame{'s' * (count > 1)} hold {bytes_text(needed)} before compression,"
+            f" and {bytes_text(free)} are free in {job.output.directory}"
+        )
