@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -217,11 +217,12 @@ def image_colors(image: Path) -> NDArray[Any]:
     Raises:
         OutputError: the image cannot be read or has no colours.
     """
-    channels = whole_frame(read_exr(image))
-    if missing := [name for name in "RGB" if name not in channels]:
-        have = ", ".join(channels)
+    found = read_exr(image)
+    if missing := [name for name in "RGB" if name not in found.channels]:
+        have = ", ".join(found.channels)
         wrong = f"has no channel {missing[0]}, expected R, G and B (it has {have})"
         raise OutputError(Problem(wrong, file=str(image)))
+    channels = whole_frame(replace(found, channels={name: found.channels[name] for name in "RGB"}))
     return np.stack([channels[name] for name in "RGB"], axis=-1)
 
 

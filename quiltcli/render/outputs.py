@@ -14,6 +14,7 @@ from quiltcli import __version__
 from quiltcli.display import lit_facets
 from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.formats.exr.digest import is_sealed
+from quiltcli.formats.exr.header import plausible_frame
 from quiltcli.formats.exr.image import Channel, Image, read_exr, read_header, write_images
 from quiltcli.formats.whole import link_whole, make_folder, remove_file, sync_folder, write_text
 from quiltcli.geometry import BoolArray, IntArray, facet_from_world
@@ -225,8 +226,11 @@ def _write(
         frame = window = (0, 0), (width - 1, height - 1)
         if how.data_window == "tight":
             with clock.stage("tighten"):
-                window = tight_window(channels)
-                channels = cropped(channels, window)
+                (x0, y0), (x1, y1) = tight_window(channels)
+                # An almost empty file of a huge page would not be believed when it is read.
+                if plausible_frame((width, height), (x1 - x0 + 1, y1 - y0 + 1)):
+                    window = (x0, y0), (x1, y1)
+                    channels = cropped(channels, window)
         images.append(Image(channels, own, how.compression, window, frame, one.view.part))
     with clock.stage("compress and store"):
         write_images(path, images)

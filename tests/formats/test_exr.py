@@ -306,10 +306,10 @@ def test_a_file_that_is_not_there(tmp_path):
     path = tmp_path / "a.exr"
     with pytest.raises(OutputError) as caught:
         read_exr(path)
-    assert f"{path}: cannot be read: No such file or directory" == said(caught)
+    assert f"{path}: no such file (expected an EXR)" == said(caught)
     with pytest.raises(OutputError) as caught:
         read_exr(tmp_path)
-    assert f"{tmp_path}: cannot be read: Is a directory" == said(caught)
+    assert f"{tmp_path}: is a directory (expected an EXR file)" == said(caught)
 
 
 @pytest.mark.parametrize(

@@ -173,7 +173,7 @@ def test_a_file_that_cannot_be_read(tmp_path):
     size = (tmp_path / "a.exr").stat().st_size
     expected = f"{tmp_path / 'b.exr'}: is truncated: {size - 5} of {size} bytes"
     assert only(diff(tmp_path / "a.exr", tmp_path / "b.exr")) == (4, expected)
-    expected = f"{tmp_path / 'no.exr'}: cannot be read: No such file or directory"
+    expected = f"{tmp_path / 'no.exr'}: no such file (expected an EXR)"
     assert only(diff(tmp_path / "no.exr", tmp_path / "a.exr")) == (4, expected)
 
 
@@ -264,6 +264,6 @@ def test_the_table_has_a_line_for_each_channel(tmp_path):
 def test_the_table_says_what_went_wrong(tmp_path):
     write_exr(tmp_path / "a.exr", image(), {})
     (line,) = diff_rows(diff(tmp_path / "a.exr", tmp_path / "no.exr"))
-    said = f"{tmp_path / 'no.exr'}: cannot be read: No such file or directory"
+    said = f"{tmp_path / 'no.exr'}: no such file (expected an EXR)"
     assert line == ("a.exr", "", "", "file error", said, "", "", "", "", "")
     assert len(line) == len(COLUMNS)

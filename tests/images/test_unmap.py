@@ -348,7 +348,7 @@ def test_every_problem_is_told_before_anything_is_written(tmp_path):
         f"{others[0]}: is page 3, the layout has pages 1–2",
         f"{others[1]}: does not say which page it is, {wanted}page",
         f"{others[2]}: does not say which frame it is, {wanted}frame",
-        f"{others[3]}: cannot be read: No such file or directory",
+        f"{others[3]}: no such file (expected an EXR)",
         f"{twin}: is page 1 of frame 3, and so is {paths[0]}",
     ]
     assert not (tmp_path / "new").exists()

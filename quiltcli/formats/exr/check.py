@@ -11,17 +11,22 @@ import mmap
 import struct
 from pathlib import Path
 
-_MAGIC = 20000630
+from quiltcli.errors import OutputError
+from quiltcli.formats.capacity import bytes_text, free_memory
+from quiltcli.formats.exr.header import FaultError, Header, read_header
+from quiltcli.formats.inputs import open_input
+
+_MAGIC, _VERSION = 20000630, 2
 _DEEP, _MULTIPART, _TILED = 0x800, 0x1000, 0x200
 
 
-class _FaultError(Exception):
-    """What is wrong with the file, for the reader of this module."""
-
-
 def exr_fault(path: Path) -> str:
-    """What is wrong with the structure of the file at `path`, "" when it is whole (OSError)."""
-    with path.open("rb") as file:
+    """What is wrong with the structure of the file at `path`, "" when it is whole.
+
+    Raises:
+        OutputError: there is no such file, or it cannot be read.
+    """
+    with open_input(path, OutputError, "an EXR") as file:
         if not file.seek(0, 2):
             return "is empty, expected an OpenEXR image"
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
@@ -29,76 +34,75 @@ def exr_fault(path: Path) -> str:
                 _check(data)
             except struct.error:
                 return f"is truncated: it ends inside its header or chunk table, after {len(data)} bytes"
-            except _FaultError as fault:
+            except FaultError as fault:
                 return str(fault)
     return ""
+
+
+def pixels_fault(path: Path) -> str:
+    """What keeps the pixels of a file whose structure is whole from being read: memory; "" when nothing does.
+
+    Raises:
+        OutputError: the file cannot be read.
+    """
+    with open_input(path, OutputError, "an EXR") as file:
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            _, version = struct.unpack_from("<iI", data, 0)
+            _, headers = _headers(data, version)
+    needed, free = sum(header.pixels * header.pixel_bytes for header in headers), free_memory()
+    if free is None or needed <= free:
+        return ""
+    return f"has {sum(h.pixels for h in headers):,} pixels, which take {bytes_text(needed)} of memory, " + (
+        f"but {bytes_text(free)} are free"
+    )
 
 
 def _check(data: mmap.mmap) -> None:
     magic, version = struct.unpack_from("<iI", data, 0)
     if magic != _MAGIC:
-        raise _FaultError("is no OpenEXR image")
+        raise FaultError("is no OpenEXR image")
+    if version & 0xFF != _VERSION:
+        raise FaultError(f"is of version {version & 0xFF} of OpenEXR, expected {_VERSION}")
     if version & _DEEP:
-        raise _FaultError("holds deep samples, expected flat pixels")
-    table, kinds = _headers(data, bool(version & _MULTIPART))
-    last = _last_chunk(data, table)
+        raise FaultError("holds deep samples, expected flat pixels")
+    table, headers = _headers(data, version)
+    last = _last_chunk(data, table, sum(header.chunks for header in headers))
     if last + 4 > len(data):
-        raise _FaultError(f"is truncated: {len(data)} bytes, expected more than {last}")
+        raise FaultError(f"is truncated: {len(data)} bytes, expected more than {last}")
     tiled = bool(version & _TILED)
     if version & _MULTIPART:
         (part,) = struct.unpack_from("<i", data, last)
-        tiled = 0 <= part < len(kinds) and kinds[part].startswith(b"tiled")
+        tiled = 0 <= part < len(headers) and headers[part].kind.startswith("tiled")
         last += 4
     last += 20 if tiled else 8  # a tile is led by four coordinates, a row of scanlines by one; then the size
     if last > len(data):
-        raise _FaultError(f"is truncated: {len(data)} bytes, expected at least {last}")
+        raise FaultError(f"is truncated: {len(data)} bytes, expected at least {last}")
     end = last + struct.unpack_from("<i", data, last - 4)[0]
     if end > len(data):
-        raise _FaultError(f"is truncated: {len(data)} of {end} bytes")
+        raise FaultError(f"is truncated: {len(data)} of {end} bytes")
 
 
-def _headers(data: mmap.mmap, multipart: bool) -> tuple[int, list[bytes]]:
-    """Where the first offset table starts, and the `type` attribute of every part."""
-    at, kinds = 8, []
+def _headers(data: mmap.mmap, version: int) -> tuple[int, list[Header]]:
+    """Where the first offset table starts, and the header of every part."""
+    at, headers = 8, []
     while True:
-        at, kind = _header(data, at)
-        kinds.append(kind)
-        if not multipart:
-            return at, kinds
+        at, header = read_header(data, at, bool(version & _TILED))
+        headers.append(header)
+        if not version & _MULTIPART:
+            return at, headers
         if struct.unpack_from("<B", data, at)[0] == 0:
-            return at + 1, kinds
+            return at + 1, headers
 
 
-def _header(data: mmap.mmap, at: int) -> tuple[int, bytes]:
-    kind = b""
-    while True:
-        at, name = _word(data, at)
-        if not name:
-            return at, kind
-        at, _ = _word(data, at)
-        (size,) = struct.unpack_from("<i", data, at)
-        if size < 0:
-            raise _FaultError("has a broken header")
-        if name == b"type":
-            kind = data[at + 4 : at + 4 + size]
-        at += 4 + size
-
-
-def _word(data: mmap.mmap, at: int) -> tuple[int, bytes]:
-    """The position after a zero-terminated word, and the word."""
-    end = data.find(b"\0", at)
-    if end < 0:
-        raise struct.error
-    return end + 1, data[at:end]
-
-
-def _last_chunk(data: mmap.mmap, at: int) -> int:
+def _last_chunk(data: mmap.mmap, at: int, least: int) -> int:
     """Largest offset of the tables that start at `at`; the tables end where the first chunk begins."""
-    first, last = len(data) + 1, 0
+    first, last, start = len(data) + 1, 0, at
     while at < first:
         (offset,) = struct.unpack_from("<Q", data, at)
         at += 8
         if offset < at:
-            raise _FaultError("is unfinished: its chunk table is not filled in")
+            raise FaultError("is unfinished: its chunk table is not filled in")
         first, last = min(first, offset), max(last, offset)
+    if (at - start) // 8 < least:
+        raise FaultError(f"is damaged: its data window needs {least:,} chunks, it has {(at - start) // 8:,}")
     return last

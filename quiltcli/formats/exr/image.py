@@ -16,7 +16,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem
-from quiltcli.formats.exr.check import exr_fault
+from quiltcli.formats.exr.check import exr_fault, pixels_fault
 from quiltcli.formats.exr.digest import ATTRIBUTE, BLANK, seal
 from quiltcli.formats.whole import whole_file, write_problem
 
@@ -179,6 +179,8 @@ def read_parts(path: Path) -> tuple[Image, ...]:
         OutputError: the file is missing, truncated, damaged, subsampled or no flat OpenEXR image.
     """
     headers = _read_headers(path)
+    if fault := pixels_fault(path):
+        raise OutputError(Problem(fault, file=str(path)))
     # `with` would empty the parts: the arrays are handed over by the library, not shared with it.
     parts = _open(path, separate_channels=True).parts
     if len(parts) != len(headers):
@@ -211,11 +213,7 @@ def read_header(path: Path) -> Image:
 
 def _read_headers(path: Path) -> list[Mapping[str, Any]]:
     """Headers of the parts of a file whose structure is whole."""
-    try:
-        fault = exr_fault(path)
-    except OSError as error:
-        raise OutputError(Problem(f"cannot be read: {error.strerror}", file=str(path))) from error
-    if fault:
+    if fault := exr_fault(path):
         raise OutputError(Problem(fault, file=str(path)))
     return [part.header for part in _open(path, header_only=True).parts]
 
@@ -223,8 +221,11 @@ def _read_headers(path: Path) -> list[Mapping[str, Any]]:
 def _open(path: Path, **how: bool) -> Any:
     try:
         return OpenEXR.File(str(path), **how)
-    except RuntimeError as error:
-        raise OutputError(Problem(f"cannot be read: {error}", file=str(path))) from error
+    except (MemoryError, KeyboardInterrupt):
+        raise
+    except Exception as error:  # the bindings raise whatever they meet in a damaged file
+        words = error if isinstance(error, RuntimeError) else "is damaged"
+        raise OutputError(Problem(f"cannot be read: {words}", file=str(path))) from error
 
 
 def _image(header: Mapping[str, Any], channels: Mapping[str, Any]) -> Image:
