@@ -8,7 +8,7 @@ import numpy as np
 
 from quiltcli.geometry import Float32Array
 
-_HEADER = re.compile(rb"(PF|Pf)\s+(\d+)\s+(\d+)\s+([-+.\deE]+)\s", re.DOTALL)
+_HEADER = re.compile(rb"(PF|Pf)\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,40})\s", re.DOTALL)
 
 
 class PfmError(ValueError):

@@ -2,7 +2,7 @@
 
 from quiltcli.layout.align import align
 from quiltcli.layout.check import check_layout, layout_problems
-from quiltcli.layout.file import layout_text, read_layout, write_layout
+from quiltcli.layout.file import file_problems, layout_text, read_layout, write_layout
 from quiltcli.layout.from_uv import layout_from_polygons, layout_from_uv
 from quiltcli.layout.layout import Layout, quilt_polygons, whole_pixel
 from quiltcli.layout.owners import pixel_owners
@@ -14,6 +14,7 @@ __all__ = [
     "align",
     "check_layout",
     "facet_spans",
+    "file_problems",
     "fill",
     "layout_from_polygons",
     "layout_from_uv",

@@ -9,8 +9,11 @@ from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
+from quiltcli.errors import Problem
 from quiltcli.formats.whole import write_text
+from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import segments
 from quiltcli.job.layout_table import LayoutTable, read_layout_table
 from quiltcli.layout.check import check_layout
@@ -55,6 +58,41 @@ def layout_from_table(table: LayoutTable) -> Layout:
         place=table.source,
         file_row=order,
     )
+
+
+def file_problems(layout: Layout, path: Path) -> list[Problem]:
+    """What would keep the layout from being read back from a file at `path`."""
+    from quiltcli.job import LayoutFile
+    from quiltcli.job.messages import problems_of
+
+    try:
+        LayoutFile.model_validate(_plain(layout))
+    except ValidationError as error:
+        return problems_of(error, LayoutFile, Source(path))
+    return []
+
+
+def _plain(layout: Layout) -> dict[str, object]:
+    """What the file says, as plain data."""
+    columns = ("size", "quilt_from_facet", "origin", "du", "dv")
+    rows = np.flatnonzero(layout.page >= 0).tolist()
+    facets = [
+        {
+            "id": int(layout.facet[row]),
+            "page": int(layout.page[row]) + 1,
+            **{key: getattr(layout, key)[row].tolist() for key in columns},
+            "polygon": layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]].tolist(),
+        }
+        for row in rows
+    ]
+    pages = [{"size": size} for size in layout.pages.tolist()]
+    return {
+        "quilt_layout": 1,
+        "method": layout.method,
+        "padding": layout.padding,
+        "pages": pages,
+        "facets": facets,
+    }
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:

@@ -81,7 +81,7 @@ def test_patterns_of_several_kinds(folder):
             ("import", "m.svg", "-o", "l.yaml"),
             "error: m.svg: holds template drawing, one file a page, a format",
         ),
-        (("import", "m.csv", "-o", "l.yaml"), "error: m.csv: cannot be read: No such file or directory"),
+        (("import", "m.csv", "-o", "l.yaml"), "error: m.csv: no such file"),
         (
             ("pattern", "layout.yaml", "-o", "out", "--kind", "gird"),
             "error: unknown pattern 'gird' (known: id",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from quiltcli.display import Facets, load_display
-from quiltcli.errors import LayoutError, Problem
+from quiltcli.errors import LayoutError, Problem, raise_all
 from quiltcli.exchange.pixelmaps.jsonmap import read_json, write_json
 from quiltcli.exchange.pixelmaps.mpcdiread import read_mpcdi
 from quiltcli.exchange.pixelmaps.mpcdiwrite import write_mpcdi, write_mpcdi_1
@@ -17,7 +17,7 @@ from quiltcli.exchange.pixelmaps.stmap import write_st_maps
 from quiltcli.exchange.pixelmaps.template import write_png_template, write_svg_template
 from quiltcli.job import load_display_file
 from quiltcli.job.model import suggest
-from quiltcli.layout import Layout, align
+from quiltcli.layout import Layout, align, file_problems
 
 Writer = Callable[[Layout, Facets | None, Path], list[Path]]
 Reader = Callable[[Path, Facets | None, tuple[int, int] | None], Layout]
@@ -121,7 +121,9 @@ def read_map(
         known = ", ".join(name for name, other in FORMATS.items() if other.read)
         message = f"holds {entry.about}, a format that is only written (formats to read: {known})"
         raise LayoutError(Problem(message, file=str(path)))
-    return entry.read(path, facets, size)
+    layout = entry.read(path, facets, size)
+    raise_all(LayoutError, file_problems(layout, path))
+    return layout
 
 
 def known_display(layout: Layout, path: Path | None = None) -> Facets | None:

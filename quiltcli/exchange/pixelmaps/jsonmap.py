@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from pydantic import ValidationError
 from quiltcli.display import Facets
 from quiltcli.errors import JobError, LayoutError, Problem
 from quiltcli.exchange.pixelmaps.placing import adopted, panel, placed_rows
+from quiltcli.formats.inputs import read_input
 from quiltcli.formats.whole import write_text
 from quiltcli.formats.yaml.source import Source, parse_yaml
 from quiltcli.job import LayoutFile
@@ -72,31 +75,64 @@ def _entries(layout: Layout, facets: Facets | None) -> list[dict[str, Any]]:
 
 def read_json(path: Path, display: Facets | None, size: tuple[int, int] | None) -> Layout:
     """Read what `write_json` wrote; `size` says nothing new, for the pages have theirs."""
-    layout = layout_from_table(table_of(_model(path, _data(path))))
-    return adopted(layout, display, path)
+    data = read_input(path, LayoutError)
+    return adopted(layout_from_json(data, path, lambda: _marked(path)), display, path)
 
 
-def _data(path: Path) -> Any:
+def layout_from_json(
+    data: bytes, path: Path, marks: Callable[[], Source] | None = None, what: str = ""
+) -> Layout:
+    """The layout in JSON text, checked key by key but not yet as a whole.
+
+    Args:
+        data: the text.
+        path: the file it is from, for messages and as what file names are relative to.
+        marks: tells where values stand, asked only when something is wrong.
+        what: the part of the file that is the text, empty when it is all of it.
+
+    Raises:
+        LayoutError, JobError: it is no JSON, or no layout.
+    """
+    found = _parsed(data, path, f"{what} " if what else "")
     try:
-        return json.loads(path.read_bytes())
-    except OSError as error:
-        raise LayoutError(Problem(f"cannot be read: {error.strerror}", file=str(path))) from None
-    except json.JSONDecodeError as error:
-        message = f"is not JSON: {error.msg[0].lower()}{error.msg[1:]}"
-        raise LayoutError(Problem(message, str(path), error.lineno, error.colno)) from None
-    except UnicodeDecodeError:
-        raise LayoutError(Problem("is not JSON: it is not UTF-8 text", file=str(path))) from None
-
-
-def _model(path: Path, data: Any) -> LayoutFile:
-    """The file's model. JSON is YAML as well, and that reader, though slow, knows where each value stands."""
-    try:
-        model = LayoutFile.model_validate(_essential(data), context={"base": path.parent})
+        model = LayoutFile.model_validate(_essential(found), context={"base": path.parent})
     except ValidationError as error:
-        found = parse_yaml(path)
-        raise JobError([*found.problems, *problems_of(error, LayoutFile, found.source)]) from None
+        problems = problems_of(error, LayoutFile, marks() if marks else Source(path))
+        if what:
+            problems = [replace(problem, key=f"{what}: {problem.key}".strip(": ")) for problem in problems]
+        raise JobError(problems) from None
     attach(model, Source(path))
-    return model
+    return layout_from_table(table_of(model))
+
+
+def _parsed(data: bytes, path: Path, before: str) -> Any:
+    try:
+        return json.loads(data, parse_int=_whole)
+    except json.JSONDecodeError as error:
+        message = f"{before}is not JSON: {error.msg[0].lower()}{error.msg[1:]}"
+        place = (error.lineno, error.colno) if not before else (0, 0)
+        raise LayoutError(Problem(message, str(path), *place)) from None
+    except UnicodeDecodeError:
+        raise LayoutError(Problem(f"{before}is not JSON: it is not UTF-8 text", file=str(path))) from None
+    except RecursionError:
+        raise LayoutError(Problem(f"{before}nests its values too deeply", file=str(path))) from None
+    except ValueError as error:  # of `_whole`
+        raise LayoutError(Problem(f"{before}{error}", file=str(path))) from None
+
+
+def _whole(text: str) -> int:
+    """A whole number; Python itself refuses to write out those of thousands of digits."""
+    if len(text) > 300:
+        raise ValueError(f"holds a number of {len(text):,} digits, more than any that is meant")
+    return int(text)
+
+
+def _marked(path: Path) -> Source:
+    """Where the values of the file stand: JSON is YAML as well, but for tabs and the like."""
+    try:
+        return parse_yaml(path).source
+    except JobError:
+        return Source(path)
 
 
 def _essential(data: Any) -> Any:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from quiltcli.display import Facets
-from quiltcli.errors import LayoutError, Problem
+from quiltcli.errors import JobError, LayoutError, Problem
+from quiltcli.exchange.pixelmaps.jsonmap import layout_from_json
 from quiltcli.exchange.pixelmaps.mpcdiwrite import SUPPLEMENT, XML
 from quiltcli.exchange.pixelmaps.mpcdixml import (
     Archive,
@@ -29,7 +28,8 @@ from quiltcli.geometry import FloatArray
 from quiltcli.layout import Layout
 from quiltcli.layout.layout import PIXEL_TOLERANCE
 
-_VECTORS = ("origin", "du", "dv")
+_SUPPLEMENT_BYTES = 64_000_000
+_LEAST_WARP, _MOST_WARP = 2**22, 2**29
 
 
 def read_mpcdi(path: Path, display: Facets | None, size: tuple[int, int] | None) -> Layout:
@@ -43,7 +43,7 @@ def read_mpcdi(path: Path, display: Facets | None, size: tuple[int, int] | None)
     return adopted(_exact(layout, supplement), display, path)
 
 
-def _read(archive: Archive, display: Facets | None) -> tuple[Layout, dict[str, Any] | None]:
+def _read(archive: Archive, display: Facets | None) -> tuple[Layout, Layout | None]:
     """The layout as the archive's warps have it, and its supplement."""
     path, root = archive.path, read_root(archive)
     pages, regions = read_regions(root, path)
@@ -78,10 +78,10 @@ def _read(archive: Archive, display: Facets | None) -> tuple[Layout, dict[str, A
         corner_start=rasters.corner_start,
         polygon=rasters.polygon,
         pages=np.array(pages, dtype=np.int32),
-        padding=int((supplement or {}).get("padding", 0)),
-        method=str((supplement or {}).get("method", "mpcdi")),
+        padding=supplement.padding if supplement else 0,
+        method=supplement.method if supplement else "mpcdi",
         display="",
-        display_sha256=str((supplement or {}).get("display_sha256", "")),
+        display_sha256=supplement.display_sha256 if supplement else "",
     )
     return layout, supplement
 
@@ -99,7 +99,7 @@ def _place(archive: Archive, region: Region, filesets: dict[str, ElementTree.Ele
         message = f"{XML} names no geometryWarpFile for the region {region.id!r}"
         raise LayoutError(Problem(message, file=str(archive.path)))
     try:
-        image = read_pfm(archive.read(name.strip()))
+        image = read_pfm(archive.read(name.strip(), _warp_bytes(region)))
     except PfmError as error:
         raise LayoutError(Problem(f"{name.strip()} {error}", file=str(archive.path))) from None
     matrix, miss = fitted(image, region)
@@ -109,6 +109,12 @@ def _place(archive: Archive, region: Region, filesets: dict[str, ElementTree.Ele
             Problem(f"{message}, expected an affine map (a flat facet)", file=str(archive.path))
         )
     return matrix
+
+
+def _warp_bytes(region: Region) -> int:
+    """The most that a warp may hold: some samples for each of the region's pixels."""
+    width, height = region.size
+    return min(max(4 * 12 * width * height, _LEAST_WARP), _MOST_WARP)
 
 
 def fitted(image: np.ndarray, region: Region) -> tuple[FloatArray, float]:
@@ -138,26 +144,23 @@ def fitted(image: np.ndarray, region: Region) -> tuple[FloatArray, float]:
     return matrix, float(np.abs(left).max())
 
 
-def _supplement(archive: Archive) -> dict[str, Any] | None:
-    """What quilt.json says, when there is one."""
-    try:
-        data = archive.read(SUPPLEMENT)
-    except LayoutError:
+def _supplement(archive: Archive) -> Layout | None:
+    """What quilt.json says, when there is one (LayoutError)."""
+    if not archive.has(SUPPLEMENT):
         return None
     try:
-        found = json.loads(data)
-        found["facets"] = {int(entry["id"]): entry for entry in found["facets"]}
-    except (ValueError, KeyError, TypeError) as error:
-        message = f"{SUPPLEMENT} is not what quilt writes ({error}); without it the display is needed"
-        raise LayoutError(Problem(message, file=str(archive.path))) from None
-    return dict(found)
+        data = archive.read(SUPPLEMENT, _SUPPLEMENT_BYTES)
+        return layout_from_json(data, archive.path, what=SUPPLEMENT)
+    except JobError as error:
+        message = f"{SUPPLEMENT} is not what quilt writes; without it the display is needed"
+        raise LayoutError([Problem(message, file=str(archive.path)), *error.problems]) from None
 
 
 def _rasters(
     path: Path,
     ids: list[int],
     regions: list[Region],
-    supplement: dict[str, Any] | None,
+    supplement: Layout | None,
     display: Facets | None,
 ) -> Rasters:
     """Rasters of the facets, from the display when one is given and the supplement is not there."""
@@ -172,7 +175,8 @@ def _rasters(
         entries(path, problems)
         rasters = display_rasters(display, known)
     else:
-        rasters = _supplement_rasters(path, ids, supplement or {})
+        assert supplement is not None  # `_read` has seen to it
+        rasters = _supplement_rasters(path, ids, supplement)
     for facet, region, own in zip(ids, regions, rasters.size.tolist(), strict=True):
         if tuple(own) != region.size:
             source = display.path if supplement is None and display else SUPPLEMENT
@@ -185,32 +189,31 @@ def _rasters(
     return rasters
 
 
-def _supplement_rasters(path: Path, ids: list[int], supplement: dict[str, Any]) -> Rasters:
-    facets = supplement["facets"]
-    entries(
-        path,
-        [Problem(f"{SUPPLEMENT} says nothing of facet {n}", file=str(path)) for n in ids if n not in facets],
+def _supplement_rasters(path: Path, ids: list[int], supplement: Layout) -> Rasters:
+    known = set(supplement.facet.tolist())
+    missing = [facet for facet in ids if facet not in known]
+    entries(path, [Problem(f"{SUPPLEMENT} says nothing of facet {n}", file=str(path)) for n in missing])
+    rows = np.searchsorted(supplement.facet, ids)
+    starts = supplement.corner_start
+    polygons = [supplement.polygon[starts[row] : starts[row + 1]] for row in rows]
+    return Rasters(
+        supplement.size[rows],
+        supplement.origin[rows],
+        supplement.du[rows],
+        supplement.dv[rows],
+        np.cumsum([0, *map(len, polygons)]),
+        np.concatenate(polygons),
     )
-    try:
-        chosen = [facets[facet] for facet in ids]
-        polygons = [np.array(entry["polygon"], dtype=np.float64).reshape(-1, 2) for entry in chosen]
-        vectors = [np.array([entry[key] for entry in chosen], np.float64).reshape(-1, 3) for key in _VECTORS]
-        size = np.array([entry["size"] for entry in chosen], dtype=np.int32).reshape(-1, 2)
-    except (KeyError, TypeError, ValueError) as error:
-        raise LayoutError(Problem(f"{SUPPLEMENT} is not what quilt writes ({error})", str(path))) from None
-    start = np.cumsum([0, *map(len, polygons)])
-    origin, du, dv = vectors
-    return Rasters(size, origin, du, dv, start, np.concatenate(polygons))
 
 
-def _exact(layout: Layout, supplement: dict[str, Any] | None) -> Layout:
+def _exact(layout: Layout, supplement: Layout | None) -> Layout:
     """The maps of the supplement, in full precision, where the warps say the same."""
     if supplement is None:
         return layout
     maps = layout.quilt_from_facet.copy()
     for row, facet in enumerate(layout.facet.tolist()):
-        said = np.array(supplement["facets"][facet].get("quilt_from_facet", maps[row]), dtype=np.float64)
+        said = supplement.quilt_from_facet[int(np.searchsorted(supplement.facet, facet))]
         corners = np.array([[0, 0, 1], [*layout.size[row], 1]])
-        if said.shape == (2, 3) and np.abs((said - maps[row]) @ corners.T).max() <= PIXEL_TOLERANCE:
+        if np.abs((said - maps[row]) @ corners.T).max() <= PIXEL_TOLERANCE:
             maps[row] = said
     return replace(layout, quilt_from_facet=maps)

@@ -7,6 +7,7 @@ mpcdi.xml of an unpacked one, or the folder it is in.
 from __future__ import annotations
 
 import zipfile
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +20,13 @@ import numpy as np
 from quiltcli.errors import LayoutError, Problem
 from quiltcli.exchange.pixelmaps.mpcdiwrite import XML
 from quiltcli.exchange.pixelmaps.placing import entries
+from quiltcli.formats.inputs import is_regular, name_fault, open_input
+from quiltcli.formats.yaml.source import shorten
 from quiltcli.geometry import FloatArray
+
+_XML_BYTES = 32_000_000
+_MOST_PIXELS = 1_000_000  # a side, as in layout files
+_FARTHEST = 1e6  # of a rectangle, in pages
 
 
 @dataclass(frozen=True)
@@ -29,34 +36,68 @@ class Archive:
     path: Path
     packed: zipfile.ZipFile | None
 
-    def read(self, name: str) -> bytes:
-        """Bytes of a file, a LayoutError when it is not there or cannot be read."""
+    def has(self, name: str) -> bool:
+        """Whether there is a file of this name."""
+        if self.packed:
+            return name in self.packed.namelist()
+        return is_regular((self.path if self.path.is_dir() else self.path.parent) / name)
+
+    def read(self, name: str, most: int) -> bytes:
+        """Bytes of a file, `most` at most; a LayoutError when it is not there, longer, or cannot be read."""
+        data = self._unpacked(name, most) if self.packed else self._file(name, most)
+        if len(data) > most:
+            words = f"{name} holds more than {most:,} bytes, which is more than it can mean"
+            raise LayoutError(Problem(words, file=str(self.path)))
+        return data
+
+    def _unpacked(self, name: str, most: int) -> bytes:
+        """Bytes of a member, one more than `most` where there are more: what a zip says of sizes is no proof."""
+        assert self.packed is not None
         try:
-            if self.packed:
-                return self.packed.read(name)
-            if self.path.is_dir():
-                return (self.path / name).read_bytes()
-            return (self.path if name == XML else self.path.with_name(name)).read_bytes()
-        except (KeyError, FileNotFoundError):
+            with self.packed.open(name) as member:
+                return member.read(most + 1)
+        except KeyError:
             raise LayoutError(Problem(f"has no file {name!r}", file=str(self.path))) from None
-        except (OSError, RuntimeError, NotImplementedError, zipfile.BadZipFile) as error:
-            raise LayoutError(Problem(f"{name} cannot be read: {error}", file=str(self.path))) from None
+        except MemoryError:
+            raise
+        except Exception as error:  # each kind of compression raises errors of its own
+            raise LayoutError(Problem(f"{name} is damaged ({_why(error)})", file=str(self.path))) from None
+
+    def _file(self, name: str, most: int) -> bytes:
+        """Bytes of a file of an unpacked archive, which lies in the archive's folder or below."""
+        root = self.path if self.path.is_dir() else self.path.parent
+        path = self.path if name == XML and root != self.path else root / name
+        if not is_regular(path):
+            raise LayoutError(Problem(f"has no file {name!r}", file=str(self.path)))
+        if not path.resolve().is_relative_to(root.resolve()):
+            words = f"names {name!r}, which lies outside its folder (expected a file beside {XML})"
+            raise LayoutError(Problem(words, file=str(self.path)))
+        with open_input(path, LayoutError) as file:
+            return file.read(most + 1)
 
 
 @contextmanager
 def open_archive(path: Path) -> Iterator[Archive]:
     """Open an archive: a zip, the folder of an unpacked one, or the mpcdi.xml in it (LayoutError)."""
-    if path.is_dir() or (path.is_file() and path.suffix.lower() == ".xml"):
+    if (not name_fault(path) and path.is_dir()) or (is_regular(path) and path.suffix.lower() == ".xml"):
         yield Archive(path, None)
         return
-    try:
-        packed = zipfile.ZipFile(path)
-    except OSError as error:
-        raise LayoutError(Problem(f"cannot be read: {error.strerror}", file=str(path))) from None
-    except zipfile.BadZipFile:
-        raise LayoutError(Problem("is no MPCDI archive, which is a zip file", file=str(path))) from None
-    with packed:
-        yield Archive(path, packed)
+    with open_input(path, LayoutError) as file:
+        try:
+            packed = zipfile.ZipFile(file)
+        except Exception:  # whatever the table of members makes it stumble over
+            raise LayoutError(Problem("is no MPCDI archive, which is a zip file", file=str(path))) from None
+        with packed:
+            yield Archive(path, packed)
+
+
+def _why(error: Exception) -> str:
+    """What an unpacker has met, in a few words."""
+    if isinstance(error, RuntimeError) and "password" in str(error):
+        return "it is encrypted"
+    if isinstance(error, NotImplementedError):
+        return "its compression is unknown"
+    return "it does not unpack"
 
 
 @dataclass(frozen=True)
@@ -72,12 +113,15 @@ class Region:
 
 def read_root(archive: Archive) -> ElementTree.Element:
     """The root of mpcdi.xml, of the 2D media profile (LayoutError)."""
+    text = archive.read(XML, _XML_BYTES)
     try:
-        root = ElementTree.fromstring(archive.read(XML))
+        root = ElementTree.fromstring(text)
+    except (LookupError, ValueError):
+        raise LayoutError(Problem(f"{XML} is in an unknown encoding", file=str(archive.path))) from None
     except ElementTree.ParseError as error:
         line, column = error.position
-        text = str(error).partition(":")[0]
-        raise LayoutError(Problem(f"{XML} is not XML: {text}", str(archive.path), line, column + 1)) from None
+        words = str(error).partition(":")[0]
+        raise LayoutError(Problem(f"{XML} is not XML: {words}", str(archive.path), line, column + 1)) from None
     if root.tag.lower() != "mpcdi":
         raise LayoutError(Problem(f"{XML} holds <{root.tag}>, expected <MPCDI>", file=str(archive.path)))
     profile = attributes(root).get("profile", "")
@@ -114,7 +158,7 @@ def read_regions(root: ElementTree.Element, path: Path) -> tuple[list[tuple[int,
     if not problems and not regions:
         problems.append(Problem(f"{XML} has no <region> in a <buffer>", file=str(path)))
     names = [region.id for region in regions]
-    twice = sorted({name for name in names if names.count(name) > 1}) if len({*names}) < len(names) else []
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
     problems += [Problem(f"{XML} has two regions {name!r}", file=str(path)) for name in twice]
     entries(path, problems)
     return pages, regions
@@ -129,12 +173,12 @@ def _numbers(
         text = known.get(name)
         try:
             number = kind(text)
-            good = np.isfinite(number) and (number >= 1 or kind is float)
+            good = 1 <= number <= _MOST_PIXELS if kind is int else abs(number) <= _FARTHEST
         except (TypeError, ValueError):
             number, good = 1, False
         if not good:
-            what = "a whole number from 1" if kind is int else "a number"
-            got = "nothing" if text is None else repr(text)
+            what = f"a whole number from 1 to {_MOST_PIXELS}" if kind is int else "a number"
+            got = "nothing" if text is None else repr(shorten(text))
             where = f"<{element.tag} id={known.get('id', '')!r}>"
             problems.append(Problem(f"{XML}: {where} has {got} as {name}, expected {what}", file=str(path)))
             number = 1

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-_LABEL = re.compile(r"facet_(\d+)(?:_(.*))?")
+_LABEL = re.compile(r"facet_(\d{1,9})(?:_(.*))?(?!\d)")
 _PAGE = re.compile(r"(.*)_page_(\d{2,})")
 
 

@@ -7,6 +7,7 @@ pixels from its bottom. Every facet is one polygon, whole, in an object of its o
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from quiltcli.display import Facets, build_facets
 from quiltcli.errors import LayoutError, Problem
 from quiltcli.exchange.pixelmaps.naming import existing_pages, facet_label, page_files, parse_label
 from quiltcli.exchange.pixelmaps.placing import adopted, entries, placed_rows, settled
+from quiltcli.formats.inputs import open_input
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
 from quiltcli.formats.whole import write_text
 from quiltcli.formats.yaml.source import Source
@@ -26,7 +28,7 @@ from quiltcli.job.model import attach
 from quiltcli.layout import Layout, quilt_polygons
 from quiltcli.layout.from_uv import layout_from_polygons
 
-_HEADING = re.compile(r"^# quilt page \d+ of \d+, (\d+)x(\d+) pixels", re.MULTILINE)
+_HEADING = re.compile(r"^# quilt page \d+ of \d+, (\d{1,7})x(\d{1,7}) pixels", re.MULTILINE)
 _OFF_PLACE = 2e-4  # of a facet's size: how far a corner may be from the display's
 
 
@@ -171,8 +173,8 @@ def _read_faces(path: Path, size: tuple[int, int] | None) -> _Faces:
 
 
 def _stated_size(file: Path) -> tuple[int, int] | None:
-    with file.open(encoding="utf-8", errors="replace") as text:
-        match = _HEADING.search(text.read(4096))
+    with open_input(file, LayoutError) as opened:
+        match = _HEADING.search(opened.read(4096).decode("utf-8", "replace"))
     return (int(match[1]), int(match[2])) if match else None
 
 
@@ -200,7 +202,7 @@ def _ids(names: Sequence[str], path: Path) -> list[int]:
     if not all(labels):
         return list(range(1, len(names) + 1))
     ids = [label[0] for label in labels if label]
-    twice = sorted({facet for facet in ids if ids.count(facet) > 1}) if len({*ids}) < len(ids) else []
+    twice = sorted(facet for facet, count in Counter(ids).items() if count > 1)
     entries(path, [Problem(f"facet {facet} is in the mesh twice", file=str(path)) for facet in twice])
     return ids
 

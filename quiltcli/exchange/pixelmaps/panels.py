@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+import itertools
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,11 +27,16 @@ from quiltcli.exchange.pixelmaps.placing import (
     placed_rows,
     rows_in_order,
 )
+from quiltcli.formats.inputs import read_input
 from quiltcli.formats.whole import write_text
+from quiltcli.formats.yaml.source import shorten
+from quiltcli.job.model import FARTHEST
 from quiltcli.layout import Layout
 
 PLACE = ("page", "x", "y", "width", "height")
 VECTORS = tuple(f"{vector}_{axis}" for vector in ("origin", "du", "dv") for axis in "xyz")
+_FORMULAS = ("=", "+", "-", "@")
+_MOST_PAGES, _MOST_LINES, _MOST_PROBLEMS = 100_000, 1_000_000, 10_000
 COLUMNS = ("id", "name", *PLACE, "rotation", "mirror", "page_width", "page_height", *VECTORS, "polygon")
 
 
@@ -50,12 +58,23 @@ def _line(layout: Layout, facets: Facets | None, row: int) -> list[object]:
     vectors = (number for key in (layout.origin, layout.du, layout.dv) for number in key[row].tolist())
     return [
         facet,
-        facets.names[facet - 1] if facets else "",
+        harmless(facets.names[facet - 1]) if facets else "",
         *(place.page + 1, place.x, place.y, place.width, place.height, place.rotation, int(place.mirror)),
         *layout.pages[place.page].tolist(),
         *map(_number, vectors),
         "; ".join(f"{_number(x)} {_number(y)}" for x, y in corners.tolist()),
     ]
+
+
+def harmless(text: str) -> str:
+    """Text that no spreadsheet takes for a formula: one that starts like a formula is led by an apostrophe."""
+    return f"'{text}" if text.lstrip().startswith(_FORMULAS) else text
+
+
+def _name(text: str) -> str:
+    """The text that `harmless` was given."""
+    bare = text.removeprefix("'")
+    return bare if bare.lstrip().startswith(_FORMULAS) else text
 
 
 def _number(value: float) -> str:
@@ -65,31 +84,45 @@ def _number(value: float) -> str:
 
 @dataclass
 class _Table:
-    """A table as it is read: its lines, and what is wrong with them."""
+    """A table as it is read, and what is wrong with it.
+
+    Attributes:
+        path: the file.
+        columns: place of each column by its name.
+        lines: line of the file and cells of each row; the last cells may lack.
+        problems: what is wrong.
+    """
 
     path: Path
-    columns: Sequence[str]
-    lines: list[tuple[int, dict[str, str]]]
+    columns: Mapping[str, int]
+    lines: list[tuple[int, list[str]]]
     problems: list[Problem] = field(default_factory=list)
 
     def problem(self, message: str, line: int, column: str = "") -> None:
         self.problems.append(Problem(message, str(self.path), line, key=column))
+        if len(self.problems) == _MOST_PROBLEMS:  # a file of another kind: its other lines are no better
+            entries(self.path, self.problems)
 
-    def number(self, at: int, column: str, kind: Any = int, default: Any = None) -> Any:
-        """A number of a line; where there is none, `default`, or a problem and 0."""
-        line, cells = self.lines[at]
-        text = cells.get(column, "").strip()
+    def text(self, at: int, column: str) -> str:
+        """A cell of a line, empty where there is none."""
+        cells, place = self.lines[at][1], self.columns.get(column, -1)
+        return cells[place].strip() if 0 <= place < len(cells) else ""
+
+    def number(self, at: int, column: str, kind: Any = int, default: Any = None, spare: int = 0) -> Any:
+        """A number of a line; where there is none, `default`, or a problem and `spare`."""
+        text = self.text(at, column)
         if not text and default is not None:
             return default
         try:
-            value = kind(float(text)) if kind is int and float(text) == int(float(text)) else kind(text)
-        except (ValueError, OverflowError):
-            value = None
-        if value is None or not np.isfinite(value):
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= FARTHEST or (kind is int and not value.is_integer()):
             wanted = "a whole number" if kind is int else "a number"
-            self.problem(f"found {text!r}, expected {wanted}", line, column)
-            return kind(0)
-        return value
+            far = f" from -{FARTHEST:.0f} to {FARTHEST:.0f}" if abs(value) > FARTHEST else ""
+            self.problem(f"found {shorten(text)!r}, expected {wanted}{far}", self.lines[at][0], column)
+            return kind(spare)
+        return kind(value)
 
 
 def read_panels(path: Path, display: Facets | None, size: tuple[int, int] | None) -> Layout:
@@ -128,24 +161,32 @@ def read_panels(path: Path, display: Facets | None, size: tuple[int, int] | None
 
 def _read_table(path: Path) -> _Table:
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise LayoutError(Problem(f"cannot be read: {error.strerror}", file=str(path))) from None
+        text = read_input(path, LayoutError).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise LayoutError(Problem("is not UTF-8 text (expected a table of panels)", file=str(path))) from None
     # Spreadsheets of half of Europe separate by semicolons.
     first = text.partition("\n")[0]
     separator = ";" if first.count(";") > first.count(",") else "\t" if "\t" in first else ","
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
-    rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    if not rows:
+    rows = ((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
+    try:
+        line, names = next(rows, (1, []))
+        columns = [cell.strip().lower() for cell in names]
+        lines = list(itertools.islice(rows, _MOST_LINES + 1))
+    except csv.Error:
+        message = "has a cell longer than any table of panels needs (is a quote left open?)"
+        raise LayoutError(Problem(message, str(path), reader.line_num)) from None
+    if len(lines) > _MOST_LINES:
+        raise LayoutError(Problem(f"has more than {_MOST_LINES:,} lines, expected a line a facet", str(path)))
+    if not names:
         raise LayoutError(Problem("is empty (expected a line of column names)", file=str(path)))
-    columns = [cell.strip().lower() for cell in rows[0][1]]
-    table = _Table(path, columns, [])
-    for line, row in rows[1:]:
+    table = _Table(path, {name: place for place, name in reversed(list(enumerate(columns)))}, lines)
+    for name, count in Counter(filter(None, columns)).items():
+        if count > 1:
+            table.problem(f"the column {shorten(name)!r} stands {count} times, expected once", line)
+    for line, row in lines:
         if len(row) > len(columns):
             table.problem(f"has {len(row)} cells, but there are {len(columns)} columns", line)
-        table.lines.append((line, dict(zip(columns, row, strict=False))))
     return table
 
 
@@ -158,7 +199,7 @@ def _check_columns(table: _Table, display: Facets | None) -> None:
     missing = [name for name in needed if name not in table.columns]
     hint = "; name the display, and it says the rest" if {*missing} & {*VECTORS, "polygon"} else ""
     if missing:
-        found = ", ".join(table.columns)
+        found = ", ".join(shorten(name) for name in sorted(table.columns, key=table.columns.__getitem__)[:40])
         message = f"has no column {', '.join(missing)} (columns found: {found}{hint})"
         raise LayoutError(Problem(message, str(table.path), 1))
     if not table.lines:
@@ -170,17 +211,21 @@ def _ids(table: _Table, display: Facets | None) -> list[int]:
     """Facet ids, by name where the table has no ids."""
     found: dict[int, int] = {}
     ids = []
-    for at, (line, cells) in enumerate(table.lines):
+    known: dict[str, list[int]] = {}
+    for facet, name in enumerate(display.names if display else (), 1):
+        known.setdefault(name, []).append(facet)
+    for at, (line, _) in enumerate(table.lines):
         if "id" in table.columns:
             facet, column = table.number(at, "id"), "id"
+            if facet < 1 and table.text(at, "id").strip("+-0."):
+                table.problem(f"found {facet}, but facets count from 1", line, column)
         else:
-            name, column = cells.get("name", "").strip(), "name"
-            known = [i for i, other in enumerate(display.names, 1) if other == name] if display else []
-            facet = known[0] if len(known) == 1 else 0
+            name, column = _name(table.text(at, "name")), "name"
+            named = known.get(name, [])
+            facet = named[0] if len(named) == 1 else 0
             if not facet and display:
-                table.problem(
-                    f"{display.path} has {len(known)} facets named {name!r}, expected one", line, column
-                )
+                words = f"{display.path} has {len(named)} facets named {shorten(name)!r}, expected one"
+                table.problem(words, line, column)
         if facet and display and not 1 <= facet <= display.count:
             table.problem(
                 f"facet {facet} is not in {display.path}, which has facets 1 to {display.count}", line, column
@@ -194,16 +239,20 @@ def _ids(table: _Table, display: Facets | None) -> list[int]:
 
 def _panel(table: _Table, at: int) -> Panel:
     line, _ = table.lines[at]
-    numbers = {name: table.number(at, name) for name in ("x", "y", "width", "height")}
+    numbers = {name: table.number(at, name) for name in ("x", "y")}
+    numbers |= {name: table.number(at, name, spare=1) for name in ("width", "height")}
     rotation = table.number(at, "rotation", int, 0)
-    mirror = table.lines[at][1].get("mirror", "").strip().lower()
-    page = table.number(at, "page", int, 1)
+    mirror = table.text(at, "mirror").lower()
+    page = table.number(at, "page", int, 1, spare=1)
     if rotation % 90:
         table.problem(f"found {rotation}, expected 0, 90, 180 or 270", line, "rotation")
     if mirror not in ("", "0", "1", "false", "true", "no", "yes"):
-        table.problem(f"found {mirror!r}, expected 0 or 1", line, "mirror")
+        table.problem(f"found {shorten(mirror)!r}, expected 0 or 1", line, "mirror")
     if page < 1:
         table.problem(f"found {page}, but pages count from 1", line, "page")
+    elif page > _MOST_PAGES:
+        table.problem(f"found {page}, expected at most {_MOST_PAGES}", line, "page")
+        page = 1
     for name in ("width", "height"):
         if numbers[name] < 1:
             table.problem(f"found {numbers[name]}, expected at least 1 pixel", line, name)
@@ -265,13 +314,13 @@ def _rasters(
 
 def _polygon(table: _Table, at: int) -> np.ndarray:
     """`x y; x y; …` in facet pixels."""
-    line, cells = table.lines[at]
-    text = cells.get("polygon", "")
+    text = table.text(at, "polygon")
     try:
         points = [[float(number) for number in pair.split()] for pair in text.split(";")]
     except ValueError:
         points = []
     if len(points) < 3 or any(len(point) != 2 for point in points):
-        table.problem(f"found {text[:40]!r}, expected 3 or more pairs such as 0 0; 9 0; 9 9", line, "polygon")
+        words = f"found {text[:40]!r}, expected 3 or more pairs such as 0 0; 9 0; 9 9"
+        table.problem(words, table.lines[at][0], "polygon")
         points = [[0.0, 0.0]] * 3
     return np.array(points)
