@@ -229,3 +229,14 @@ def test_csv_tells_all_bad_rows_up_to_twenty(tmp_path: Path) -> None:
     problems = check_viewer(track(tmp_path, rows), [1])
     assert len(problems) == 20
     assert [p.line for p in problems[:4]] == [2, 2, 3, 3]
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_csv_of_any_spreadsheet(tmp_path: Path, separator: str) -> None:
+    text = "# a path\n\nframe,x,y,z\n1,1.5,2,3\n".replace(",", separator)
+    assert viewer_at(track(tmp_path, text, look=(0.0, 0.0, -1.0)), 1).eye.tolist() == [1.5, 2, 3]
+
+
+def test_csv_places_beyond_any_display(tmp_path: Path) -> None:
+    found = check_viewer(track(tmp_path, "1,0,0,0,0,0,-1\n2,1e30,0,0,0,0,-1\n"), [1, 2])
+    assert [problem.message for problem in found] == ["x: expected a number from -1000000000 to 1000000000, got 1e30"]

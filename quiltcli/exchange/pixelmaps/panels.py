@@ -68,13 +68,12 @@ def _line(layout: Layout, facets: Facets | None, row: int) -> list[object]:
 
 def harmless(text: str) -> str:
     """Text that no spreadsheet takes for a formula: one that starts like a formula is led by an apostrophe."""
-    return f"'{text}" if text.lstrip().startswith(_FORMULAS) else text
+    return f"'{text}" if text.lstrip("' ").startswith(_FORMULAS) else text
 
 
 def _name(text: str) -> str:
     """The text that `harmless` was given."""
-    bare = text.removeprefix("'")
-    return bare if bare.lstrip().startswith(_FORMULAS) else text
+    return text.removeprefix("'") if text.lstrip("' ").startswith(_FORMULAS) else text
 
 
 def _number(value: float) -> str:
