@@ -19,6 +19,7 @@ from quiltcli.errors import JobError
 from quiltcli.job.display import UNITS, Units
 from quiltcli.job.frames import parse_frames
 from quiltcli.job.model import (
+    FARTHEST,
     Complaint,
     Direction,
     ExistingFile,
@@ -129,7 +130,7 @@ class OrbitSpec(Model):
 
     center: Vec3
     """Centre, metres."""
-    radius: Positive
+    radius: Annotated[Positive, Field(le=FARTHEST)]
     """Distance from the centre, or from the vertical axis when `height` is given, metres."""
     height: Number | None = None
     """Height of the eye over the centre, metres."""
