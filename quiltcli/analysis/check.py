@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from quiltcli.display import Facets, load_display
 from quiltcli.errors import Problem, QuiltError
+from quiltcli.formats.inputs import is_regular
 from quiltcli.formats.mesh.read import SUFFIXES
 from quiltcli.formats.yaml.source import parse_yaml
 from quiltcli.images.names import layout_path
@@ -92,7 +93,7 @@ class _Findings:
         data = parse_yaml(path).data
         for key in ("display", "layout", "scene"):
             name = data.get(key)
-            if isinstance(name, str) and (path.parent / name).is_file():
+            if isinstance(name, str) and is_regular(path.parent / name):
                 self.check(path.parent / name)
 
     def scene(self, path: Path, spec: SceneFile | Path | None) -> None:
@@ -129,7 +130,7 @@ def _display_of(findings: _Findings, layout: LayoutFile) -> Facets | None:
     """The display a layout says it was made for, if it says so."""
     if layout.display is None:
         return None
-    if layout.display.is_file():
+    if is_regular(layout.display):
         return findings.facets(layout.display)
     what = "is a directory (expected a display file)" if layout.display.is_dir() else "no such file"
     findings.problems.append(layout.source.problem("display", f"{what}: {layout.display}"))

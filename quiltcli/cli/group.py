@@ -70,8 +70,16 @@ class Quilt(click.Group):
                 ctx.exit(code)
             if ctx.params.get("debug"):
                 raise
-            click.echo(f"error: {_unexpected(error)}", err=True)
+            named = isinstance(error, OSError) and error.filename is not None
+            click.echo(f"error: {_refused(error) if named else _unexpected(error)}", err=True)
             ctx.exit(1)
+
+
+def _refused(error: Any) -> str:
+    """What the system has against a file, in its own words."""
+    from quiltcli.formats.inputs import shown_name
+
+    return f"{shown_name(str(error.filename))}: {error.strerror or error}"
 
 
 def _unexpected(error: Exception) -> str:

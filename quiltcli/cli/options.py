@@ -67,7 +67,9 @@ def _size(text: str) -> tuple[int, int] | None:
         if text in CANVASES:
             return CANVASES[text]
     width, cross, height = text.lower().partition("x")
-    sides = [int(side) if side.isascii() and side.isdigit() and len(side) < 8 else 0 for side in (width, height)]
+    sides = [
+        int(side) if side.isascii() and side.isdigit() and len(side) < 8 else 0 for side in (width, height)
+    ]
     if not cross or not all(1 <= side <= 1_000_000 for side in sides):
         raise JobError(f"expected WIDTHxHEIGHT in pixels, such as 8192x8192, or auto, got {text!r}")
     return sides[0], sides[1]

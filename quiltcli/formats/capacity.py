@@ -35,7 +35,11 @@ def free_disk(path: Path) -> int | None:
 
 def bytes_text(count: float) -> str:
     """`12.3 GB`, in thousands as disks are sold; small sizes in MB."""
-    return f"{count / 1e9:,.{1 if count < 1e11 else 0}f} GB" if count >= 1e9 else f"{max(count / 1e6, 0.1):.3g} MB"
+    return (
+        f"{count / 1e9:,.{1 if count < 1e11 else 0}f} GB"
+        if count >= 1e9
+        else f"{max(count / 1e6, 0.1):.3g} MB"
+    )
 
 
 def _fields(path: Path) -> Iterator[tuple[str, int]]:

@@ -39,14 +39,11 @@ def open_input(path: Path | str, error: type[QuiltError], kind: str = "") -> Bin
         handle = os.open(path, _FLAGS)
     except OSError as cause:
         raise error(Problem(_words(cause, kind), file=str(path))) from None
-    try:
-        mode = os.fstat(handle).st_mode
-        if not stat.S_ISREG(mode):
-            raise error(Problem(f"is {_kind(mode)} {_wanted(kind)}", file=str(path)))
-    except BaseException:
-        os.close(handle)
-        raise
-    return os.fdopen(handle, "rb")
+    mode = os.fstat(handle).st_mode
+    if stat.S_ISREG(mode):
+        return os.fdopen(handle, "rb")
+    os.close(handle)
+    raise error(Problem(f"is {_kind(mode)} {_wanted(kind)}", file=str(path)))
 
 
 def read_input(path: Path | str, error: type[QuiltError], kind: str = "") -> bytes:

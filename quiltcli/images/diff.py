@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem
+from quiltcli.formats.capacity import bytes_text, free_memory
 from quiltcli.formats.exr.image import Image, read_parts
+from quiltcli.formats.inputs import check_input, name_fault, shown_name
 from quiltcli.geometry import BoolArray
 from quiltcli.images.names import frame_digits
 from quiltcli.images.window import whole_frame
@@ -106,6 +108,9 @@ def diff(a: str | Path, b: str | Path, limits: Limits | None = None) -> DiffResu
     Of folders all EXR files below them are compared, by their relative names. Whatever cannot be
     compared is a verdict (code 4), not an error.
     """
+    for given in (a, b):
+        if fault := name_fault(given):
+            return _no_comparison(f"{shown_name(given)}: {fault}")
     found_a, found_b = _named_files(a), _named_files(b)
     if (found_a is None) != (found_b is None):
         one, other = (a, b) if found_a is None else (b, a)
@@ -244,8 +249,9 @@ def _blocks(a: NDArray[Any], b: NDArray[Any]) -> Iterator[tuple[int, NDArray[np.
 
 def read_image(path: Path) -> tuple[Image, ...]:
     """All parts of an image of any format; EXR is read strictly, others through OpenImageIO (OutputError)."""
-    if path.suffix.lower() == ".exr" or not path.is_file():
+    if path.suffix.lower() == ".exr":
         return read_parts(path)
+    check_input(path, OutputError, "an image")
     import OpenImageIO
 
     file = OpenImageIO.ImageInput.open(str(path))
@@ -261,6 +267,10 @@ def _other_parts(path: Path, file: Any) -> Iterator[Image]:
     part = 0
     while file.seek_subimage(part, 0):
         spec = file.spec()
+        needed, free = 4 * spec.width * spec.height * spec.nchannels, free_memory()
+        if free is not None and needed > free:
+            words = f"has {spec.width:,}×{spec.height:,} pixels, which take {bytes_text(needed)} of memory"
+            raise OutputError(Problem(f"{words}, but {bytes_text(free)} are free", file=str(path)))
         pixels = file.read_image(part, 0, 0, spec.nchannels, "float")
         if pixels is None:
             raise OutputError(Problem(f"cannot be read: {file.geterror()}", file=str(path)))

@@ -18,6 +18,7 @@ from quiltcli.images.facets import cut_facet, page_of
 from quiltcli.images.metadata import facet_attributes
 from quiltcli.images.names import facet_path, name_of
 from quiltcli.images.window import frame_size, whole_frame
+from quiltcli.job.job import LOSSLESS
 from quiltcli.layout import Layout, pixel_owners
 
 _FRAME = re.compile(r".*\.(-?\d+)")
@@ -42,7 +43,7 @@ def unmap(
 ) -> list[Path]:
     """Write the image of every facet on the given pages to `out`/facets; return the files.
 
-    Channels, attributes and compression are those of the quilt; `quilt:facet` and
+    Channels and attributes are those of the quilt, and its compression if that is lossless (else zip); `quilt:facet` and
     `quilt:facet_from_world` are added. All files are looked at before the first is written.
 
     Args:
@@ -61,18 +62,20 @@ def unmap(
         raise_all(OutputError, _in_the_way(files, layout, out))
     owners = pixel_owners(layout)
     maps = facet_from_world(layout.origin, layout.du, layout.dv)
-    make_folder(facet_path(out, 1, 1).parent)
     written = []
     for file in files:
         image = read_exr(file.path)
         pixels = whole_frame(image, background)
+        make_folder(facet_path(out, 1, 1).parent)  # only now: a damaged quilt leaves no empty folder
         page_owners = page_of(owners, layout, file.page)
+        # Pixels that were lossily stored once are not to lose again.
+        compression = image.compression if image.compression in LOSSLESS else "zip"
         shared = {name: value for name, value in image.attributes.items() if name != "quilt:page"}
         for row in np.flatnonzero(layout.page == file.page):
             facet = int(layout.facet[row])
             path = facet_path(out, facet, file.frame)
             cut = cut_facet(pixels, layout, int(row), page_owners, background)
-            write_exr(path, cut, shared | facet_attributes(facet, maps[row]), image.compression)
+            write_exr(path, cut, shared | facet_attributes(facet, maps[row]), compression)
             written.append(path)
     return written
 

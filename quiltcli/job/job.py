@@ -16,12 +16,10 @@ from quiltcli.job.model import (
     YAMLS,
     AnyPath,
     Complaint,
-    Count,
     ExistingFile,
     FileModel,
     Listed,
     Model,
-    Natural,
     OneOf,
     ScenePath,
     YamlPath,
@@ -34,10 +32,8 @@ from quiltcli.job.viewer import FrameRange, ViewerSpec
 
 METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
 DEPTH_BITS = ("16", "24", "32f")
-COMPRESSIONS = (
-    *("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256"),  # lossless
-    *("pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k"),  # lossy
-)
+LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
+COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
 CLIPS = ("auto", "planar", "distance")
 STEREO = ("files", "parts")
 _NAME = re.compile(r"[\w-]+")

@@ -54,7 +54,9 @@ def demand_memory(layout: Layout, pixel_bytes: int) -> None:
     pixels, free = int(layout.page_offset[-1]), free_memory()
     if free is not None and pixels * pixel_bytes > free:
         words = f"the pages have {pixels:,} pixels, which take {bytes_text(pixels * pixel_bytes)} of memory"
-        raise LayoutError(layout.problem(f"{words}, but {bytes_text(free)} are free (expected smaller pages)"))
+        raise LayoutError(
+            layout.problem(f"{words}, but {bytes_text(free)} are free (expected smaller pages)")
+        )
 
 
 def _fill_runs(layout: Layout, spans: Spans) -> Owners:

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from quiltcli.channels import exr_channels
 from quiltcli.errors import JobError
 from quiltcli.formats.capacity import bytes_text, free_disk, free_memory
 from quiltcli.job import JobFile
 from quiltcli.layout import Layout
 from quiltcli.layout.owners import owner_bytes
-from quiltcli.shading.aovs import exr_channels
 
 
 def demand_memory(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> None:
@@ -33,7 +33,9 @@ def demand_memory(job: JobFile, layout: Layout, frames: Sequence[int] | None = N
     pages = "page" if len(layout.pages) == 1 else f"{len(layout.pages)} pages"
     words = f"the quilt's {pages} of {pixels:,} pixels in all would take {bytes_text(needed)} of memory"
     raise JobError(
-        layout.problem(f"{words}, but {bytes_text(free)} are free (smaller pages or fewer channels take less)")
+        layout.problem(
+            f"{words}, but {bytes_text(free)} are free (smaller pages or fewer channels take less)"
+        )
     )
 
 

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import Problem, ViewerError, raise_all
-from quiltcli.formats.yaml.syntax import read_text
 from quiltcli.formats.yaml.source import shorten
+from quiltcli.formats.yaml.syntax import read_text
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.job.model import FARTHEST, suggest
 

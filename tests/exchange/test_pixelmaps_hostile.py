@@ -1,5 +1,7 @@
 """Pixel maps from anywhere: whatever is in them, the answer is a sentence, soon, and no layout that `check` refuses."""
 
+# ruff: noqa: E501 - exact messages are easier to read, and to find, unbroken
+
 from __future__ import annotations
 
 import os
@@ -119,7 +121,7 @@ def test_what_the_xml_cannot_mean(archive: Path, old: str, new: str, expected: s
         ('"origin": [', '"origin": ["x", ', "facets[0].origin: expected 3 numbers, got 4"),
         ('"quilt_from_facet": [[', '"quilt_from_facet": [["x", ', "facets[0].quilt_from_facet[0]: expected 3 numbers, got 4"),
     ],
-)  # fmt: skip # ruff: noqa: E501 - exact messages are easier to find unbroken
+)  # fmt: skip
 def test_what_quilt_json_cannot_mean(archive: Path, old: str, new: str, expected: str) -> None:
     lines = said(edited(archive, "quilt.json", old, new)).splitlines()
     assert lines == [
@@ -184,10 +186,14 @@ def test_names_that_a_spreadsheet_would_run_are_written_harmlessly(tmp_path: Pat
     write_map(layout, facets, tmp_path / "m.csv")
     text = (tmp_path / "m.csv").read_text()
     assert ",'" in text
-    assert not any(cell.lstrip().startswith(("=", "+", "@")) for line in text.splitlines() for cell in line.split(","))
+    assert not any(
+        cell.lstrip().startswith(("=", "+", "@")) for line in text.splitlines() for cell in line.split(",")
+    )
     assert ",it's," in text
     (tmp_path / "named.csv").write_text(text.replace("id,", "number,", 1))
-    assert read_map(tmp_path / "named.csv", facets).quilt_from_facet.tolist() == layout.quilt_from_facet.tolist()
+    assert (
+        read_map(tmp_path / "named.csv", facets).quilt_from_facet.tolist() == layout.quilt_from_facet.tolist()
+    )
 
 
 # --- what is imported can be checked ---

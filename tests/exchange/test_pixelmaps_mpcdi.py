@@ -204,7 +204,8 @@ BAD = {
         "mpcdi.xml",
         ' xResolution="64"',
         "",
-        "mpcdi.xml: <buffer id='page_01'> has nothing as xresolution, expected a whole number from 1 to 1000000",
+        "mpcdi.xml: <buffer id='page_01'> has nothing as xresolution,"
+        " expected a whole number from 1 to 1000000",
     ),
     "odd number": (
         "mpcdi.xml",

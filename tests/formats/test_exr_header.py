@@ -1,5 +1,7 @@
 """Headers that are wrong are refused in words, before the library sees them."""
 
+# ruff: noqa: E501 - exact messages are easier to read, and to find, unbroken
+
 from __future__ import annotations
 
 import struct
@@ -12,7 +14,8 @@ import pytest
 from quiltcli.errors import OutputError
 from quiltcli.formats.exr import check
 from quiltcli.formats.exr.header import plausible_frame
-from quiltcli.formats.exr.image import is_complete, read_exr, read_header, write_exr
+from quiltcli.formats.exr.image import read_exr, read_header, write_exr
+from quiltcli.images.metadata import is_complete
 
 TEXT = "quilt:depth"
 
@@ -60,7 +63,7 @@ def patched(path: Path, at: int, raw: bytes) -> str:
         ("channels", "chlist", 18, b"R", "has a broken header: it has the channel 'R' twice"),
         ("channels", "chlist", 0, b"\0", "has no channels, expected one or more"),
     ],
-)  # fmt: skip # ruff: noqa: E501 - exact messages are easier to find unbroken
+)  # fmt: skip
 def test_what_is_wrong_is_named(
     image: Path, name: str, kind: str, offset: int, raw: bytes, expected: str
 ) -> None:
@@ -91,7 +94,9 @@ def test_a_frame_whose_image_has_such_a_header_is_not_complete(image: Path) -> N
 def test_pixels_that_memory_cannot_hold_are_not_read(image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(check, "free_memory", lambda: 7199)
     assert read_header(image).data_window == ((0, 0), (39, 29))
-    with pytest.raises(OutputError, match=r"has 1,200 pixels, which take 0.1 MB of memory, but 0.1 MB are free"):
+    with pytest.raises(
+        OutputError, match=r"has 1,200 pixels, which take 0.1 MB of memory, but 0.1 MB are free"
+    ):
         read_exr(image)
     monkeypatch.setattr(check, "free_memory", lambda: 7200)
     assert read_exr(image).channels["Z"].all()

@@ -1,11 +1,12 @@
 import math
+import os
 
 import numpy as np
 import OpenEXR
 import pytest
 
 from quiltcli.formats.exr.image import write_exr
-from quiltcli.images.diff import COLUMNS, Limits, diff, diff_rows
+from quiltcli.images.diff import COLUMNS, FILE, Limits, diff, diff_rows
 
 INF, NAN = math.inf, math.nan
 
@@ -267,3 +268,22 @@ def test_the_table_says_what_went_wrong(tmp_path):
     said = f"{tmp_path / 'no.exr'}: no such file (expected an EXR)"
     assert line == ("a.exr", "", "", "file error", said, "", "", "", "", "")
     assert len(line) == len(COLUMNS)
+
+
+@pytest.mark.parametrize("name", ["pipe.exr", "pipe.png", "x" * 300 + ".exr", "no.png", "text.png"])
+def test_a_file_that_cannot_be_read_is_verdict_4(tmp_path, name):
+    write_exr(tmp_path / "a.exr", {"R": np.zeros((2, 2), np.float16)}, {})
+    if name.startswith("pipe"):
+        os.mkfifo(tmp_path / name)
+    if name == "text.png":
+        (tmp_path / name).write_text("no picture")
+    for pair in ((name, "a.exr"), ("a.exr", name)):
+        assert diff(*(tmp_path / one for one in pair)).code == FILE
+
+
+def test_an_image_whose_text_is_not_utf_8_is_verdict_4(tmp_path):
+    write_exr(tmp_path / "a.exr", {"R": np.zeros((2, 2), np.float16)}, {"owner": "abc"})
+    (tmp_path / "b.exr").write_bytes((tmp_path / "a.exr").read_bytes().replace(b"abc", b"\xffbc"))
+    result = diff(tmp_path / "a.exr", tmp_path / "b.exr")
+    assert result.code == FILE
+    assert "holds text that is not UTF-8: the attribute 'owner'" in result.files[0].message

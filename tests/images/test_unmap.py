@@ -367,3 +367,29 @@ def test_files_that_exist_stay(tmp_path):
     assert mine.read_text() == "mine"
     unmap_files(paths, layout, tmp_path, overwrite=True)
     assert exr.exr_fault(mine) == ""
+
+
+@pytest.mark.parametrize("compression", ["dwaa", "dwab", "b44", "b44a", "pxr24", "lj2k"])
+def test_what_was_lossily_stored_once_does_not_lose_again(tmp_path, compression):
+    layout = single(TURNS[0])
+    rng = np.random.default_rng(7)
+    values = {name: rng.random((30, 40)).astype(np.float16) for name in "RGBA"}
+    values["Z"] = rng.random((30, 40)).astype(np.float32)
+    write_exr(tmp_path / "page_01.0001.exr", values, {"quilt:frame": 1}, compression)
+    (path,) = unmap_files([tmp_path / "page_01.0001.exr"], layout, tmp_path / "new")
+    decoded = read_exr(tmp_path / "page_01.0001.exr").channels
+    cut = {name: plane[4:9, 11:18] for name, plane in decoded.items()}
+    assert_same(cut, read_exr(path).channels)
+    assert read_exr(path).compression == "zip"
+
+
+def test_a_damaged_quilt_leaves_no_empty_folder(tmp_path):
+    layout = single(TURNS[0])
+    path = tmp_path / "page_01.0001.exr"
+    write_exr(path, {"R": np.random.default_rng(1).random((30, 40)).astype(np.float16)}, {})
+    data = bytearray(path.read_bytes())
+    data[-200:-100] = b"x" * 100
+    path.write_bytes(data)
+    with pytest.raises(OutputError, match="is damaged"):
+        unmap_files([path], layout, tmp_path / "new")
+    assert not (tmp_path / "new").exists()

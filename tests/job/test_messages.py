@@ -147,7 +147,9 @@ def test_job_brings_up_the_problems_of_the_files_it_names(tmp_path: Path) -> Non
 
 def test_mesh_as_scene_must_be_there(tmp_path: Path) -> None:
     (tmp_path / "dir.obj").mkdir()
-    assert messages(lambda: load_scene_file(tmp_path / "x.obj"), tmp_path) == ["x.obj: no such file (expected a mesh)"]
+    assert messages(lambda: load_scene_file(tmp_path / "x.obj"), tmp_path) == [
+        "x.obj: no such file (expected a mesh)"
+    ]
     found = messages(lambda: load_scene_file(tmp_path / "dir.obj"), tmp_path)
     assert found == ["dir.obj: is a directory (expected a mesh file)"]
 

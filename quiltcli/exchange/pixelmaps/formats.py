@@ -15,6 +15,7 @@ from quiltcli.exchange.pixelmaps.objmap import read_obj_map, write_obj_map
 from quiltcli.exchange.pixelmaps.panels import read_panels, write_panels
 from quiltcli.exchange.pixelmaps.stmap import write_st_maps
 from quiltcli.exchange.pixelmaps.template import write_png_template, write_svg_template
+from quiltcli.formats.inputs import is_regular
 from quiltcli.job import load_display_file
 from quiltcli.job.model import suggest
 from quiltcli.layout import Layout, align, file_problems
@@ -132,6 +133,6 @@ def known_display(layout: Layout, path: Path | None = None) -> Facets | None:
     Raises:
         JobError, MeshError, DisplayError: it is there, but cannot be read.
     """
-    if path is None and not (layout.display and Path(layout.display).is_file()):
+    if path is None and not (layout.display and is_regular(Path(layout.display))):
         return None
     return load_display(load_display_file(path or layout.display))

@@ -51,7 +51,7 @@ class Archive:
         return data
 
     def _unpacked(self, name: str, most: int) -> bytes:
-        """Bytes of a member, one more than `most` where there are more: what a zip says of sizes is no proof."""
+        """Bytes of a member, one more than `most` if there are more: what a zip says is no proof."""
         assert self.packed is not None
         try:
             with self.packed.open(name) as member:
@@ -121,7 +121,9 @@ def read_root(archive: Archive) -> ElementTree.Element:
     except ElementTree.ParseError as error:
         line, column = error.position
         words = str(error).partition(":")[0]
-        raise LayoutError(Problem(f"{XML} is not XML: {words}", str(archive.path), line, column + 1)) from None
+        raise LayoutError(
+            Problem(f"{XML} is not XML: {words}", str(archive.path), line, column + 1)
+        ) from None
     if root.tag.lower() != "mpcdi":
         raise LayoutError(Problem(f"{XML} holds <{root.tag}>, expected <MPCDI>", file=str(archive.path)))
     profile = attributes(root).get("profile", "")

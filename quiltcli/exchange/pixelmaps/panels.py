@@ -67,7 +67,7 @@ def _line(layout: Layout, facets: Facets | None, row: int) -> list[object]:
 
 
 def harmless(text: str) -> str:
-    """Text that no spreadsheet takes for a formula: one that starts like a formula is led by an apostrophe."""
+    """Text that no spreadsheet takes for a formula: an apostrophe leads what starts like one."""
     return f"'{text}" if text.lstrip("' ").startswith(_FORMULAS) else text
 
 

@@ -45,10 +45,12 @@ def pixels_fault(path: Path) -> str:
     Raises:
         OutputError: the file cannot be read.
     """
-    with open_input(path, OutputError, "an EXR") as file:
-        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            _, version = struct.unpack_from("<iI", data, 0)
-            _, headers = _headers(data, version)
+    with (
+        open_input(path, OutputError, "an EXR") as file,
+        mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data,
+    ):
+        _, version = struct.unpack_from("<iI", data, 0)
+        _, headers = _headers(data, version)
     needed, free = sum(header.pixels * header.pixel_bytes for header in headers), free_memory()
     if free is None or needed <= free:
         return ""

@@ -109,7 +109,7 @@ def _text(raw: bytes, what: str) -> str:
     try:
         return raw.decode()
     except UnicodeDecodeError as error:
-        wrong = f"byte 0x{raw[error.start]:02x} in {ascii(raw[:40].decode('latin-1'))}"
+        wrong = f"byte 0x{raw[error.start]:02x} in {raw[:40].decode('latin-1')!a}"
         raise FaultError(f"holds text that is not UTF-8: {what} ({wrong})") from None
 
 
@@ -192,4 +192,5 @@ def _tiles(found: dict[str, tuple[str, bytes]], width: int, height: int) -> int:
     across, down = struct.unpack_from("<II", value) if kind == "tiledesc" else (0, 0)
     if not (across and down):
         raise FaultError("has a broken header: its tiles have no size")
-    return -(-width // across) * -(-height // down)
+    count: int = -(-width // across) * -(-height // down)
+    return count
