@@ -92,6 +92,18 @@ class MissingExtraError(QuiltError, ImportError):
     """A feature needs an optional package that is not installed."""
 
 
+def missing_extra(what: str, package: str, extra: str) -> MissingExtraError:
+    """The error of something that needs an optional package, with the command that brings it.
+
+    Args:
+        what: what needs it, as the start of a sentence.
+        package: its name.
+        extra: the name under which this program's own list of dependencies has it.
+    """
+    how = f"in the folder of quilt's sources: pip install -e '.[{extra}]'"
+    return MissingExtraError(f"{what} needs {package}, which is not installed ({how})")
+
+
 def raise_all(kind: type[QuiltError], problems: Iterable[Problem]) -> None:
     """Raise one `kind` that holds all `problems`; do nothing when there are none."""
     found = tuple(problems)

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from quiltcli.display import Facets, load_display
+from quiltcli.display.notices import display_notices
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
 from quiltcli.formats.mesh.read import SUFFIXES
@@ -33,6 +34,7 @@ from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
+from quiltcli.render.notices import job_warnings
 from quiltcli.scene import load_scene
 from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import view_problems, viewers_of
@@ -56,7 +58,7 @@ def check_files(paths: Iterable[Path], say: Callable[[str], None] = lambda notic
 
 
 class _Findings:
-    """The problems found so far, and the displays that were built on the way."""
+    """The problems and notices found so far, and the displays that were built on the way."""
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
@@ -105,7 +107,9 @@ class _Findings:
     def facets(self, path: Path) -> Facets | None:
         """The facets of a display file, built once."""
         if path not in self.displays:
-            self.displays[path] = self.run(load_display, self.run(load_display_file, path))
+            found = self.run(load_display, self.run(load_display_file, path))
+            self.displays[path] = found
+            self.notices += display_notices(found) if found is not None else ()
         return self.displays[path]
 
 
@@ -149,6 +153,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     placed = findings.run(layout_for, choice, facets, layout_path(job.output.directory))
     if placed is not None:
         findings.run(demand_memory, job, placed)
+        findings.notices += job_warnings(job, facets, placed) if facets is not None else ()
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
     findings.scene(job.scene, findings.run(load_scene_file, job.scene))

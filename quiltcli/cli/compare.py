@@ -12,7 +12,7 @@ from quiltcli.cli.printing import print_aligned
 
 @click.command()
 @click.argument("job", type=PATH)
-@click.option("-f", "--frame", type=int, help="The frame; the job's first by default.")
+@click.option("-f", "--frame", "--frames", "frame", type=int, help="The frame; the job's first by default.")
 @click.option("-o", "--output", type=PATH, help="Folder to write to; compare in the job's by default.")
 @click.option(
     "--method", "methods", type=RENDER_METHOD, multiple=True, help="Only this method; may be given again."

@@ -15,7 +15,7 @@ from quiltcli.cli.printing import ROWS, print_aligned
 @click.option("--all", "every", is_flag=True, help=f"Every row of the table, not only the first {ROWS}.")
 @click.option("--json", "as_json", is_flag=True, help="Everything, for programs.")
 def info(file: Path, every: bool, as_json: bool) -> None:
-    """Say what FILE is: a display, layout, scene, job, mesh or EXR image."""
+    """Say what FILE is: a display, layout, scene, job, mesh, EXR image, or the output folder of a render."""
     from quiltcli.analysis.info import describe
 
     found = describe(file)

@@ -15,7 +15,9 @@ from quiltcli.cli.printing import print_aligned
 @click.argument("display", type=PATH)
 @click.option("--eye", type=POINT, metavar="X,Y,Z", help="The eye the content is drawn for.")
 @click.option("--job", type=PATH, help="Take the eye of this job …")
-@click.option("-f", "--frame", type=int, help="… at this frame; the job's first by default.")
+@click.option(
+    "-f", "--frame", "--frames", "frame", type=int, help="… at this frame; the job's first by default."
+)
 @click.option(
     "--at", type=POINT, metavar="X,Y,Z", help="Content on the plane through this point, facing the eye."
 )

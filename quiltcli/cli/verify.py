@@ -14,7 +14,7 @@ from quiltcli.cli.printing import print_aligned
 
 @click.command()
 @click.argument("job", type=PATH)
-@click.option("-f", "--frame", type=int, help="The frame; the job's first by default.")
+@click.option("-f", "--frame", "--frames", "frame", type=int, help="The frame; the job's first by default.")
 @click.option("--eye", type=click.Choice(("left", "right")), help="One eye of two; both by default.")
 @click.option("-o", "--output", type=PATH, help="Folder of the images, instead of the job's.")
 @click.option("--redraw", is_flag=True, help="Draw the frame in memory even if its images exist.")

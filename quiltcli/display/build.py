@@ -8,14 +8,17 @@ import numpy as np
 
 from quiltcli.display.check import called, check_polygons
 from quiltcli.display.facets import Facets, Places
+from quiltcli.display.notices import likely_unit
 from quiltcli.display.rasters import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
 from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
 from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, dot, normalized
 from quiltcli.job.display import DisplayFile, FacetSpec
+from quiltcli.job.model import FARTHEST
 
 _MOST_PROBLEMS = 50
+_SMALLEST = 1e-9  # metres
 
 
 def load_display(spec: DisplayFile) -> Facets:
@@ -41,6 +44,7 @@ def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
     corners = _in_world(mesh, spec)
     chosen = [spec.facets.get(facet, FacetSpec()) for facet in range(1, mesh.count + 1)]
     names = tuple(choice.name or name for choice, name in zip(chosen, mesh.names, strict=True))
+    _raise(list(_beyond_measure(corners, start, names, mesh)), spec)
     _raise(
         [*_unknown_facets(mesh.count, spec), *check_polygons(corners, start, names, mesh.lines, mesh.path)],
         spec,
@@ -51,7 +55,8 @@ def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
     mirrored = np.array([choice.mirror for choice in chosen])
     right = np.where(mirrored[:, None], -right, right)
     frame = _rasters(corners, start, right, down, spec)
-    _raise([*_useless_ups(normal, names, spec), *_impossible_sizes(frame.size, names, spec)], spec)
+    extent = float(np.ptp(corners, axis=0).max())
+    _raise([*_useless_ups(normal, names, spec), *_impossible_sizes(frame.size, extent, names, spec)], spec)
     return Facets(
         names=names,
         corner_start=start,
@@ -68,6 +73,27 @@ def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
         path=str(spec.source.path),
         places=_places(spec),
     )
+
+
+def _beyond_measure(
+    corners: FloatArray, start: IntArray, names: Sequence[str], mesh: PolygonMesh
+) -> Iterator[Problem]:
+    """Facets so far away or so small that the squares of their lengths are no numbers any more."""
+    farthest = np.maximum.reduceat(np.abs(corners).max(axis=1), start[:-1])
+    for facet in np.flatnonzero(~(farthest <= FARTHEST)).tolist():
+        words = f"{called(facet, names)} reaches {farthest[facet]:.3g} m from the world's origin"
+        words += f" (expected at most {FARTHEST:.0f}; are the units and the transform right?)"
+        yield Problem(words, mesh.path, int(mesh.lines[facet]))
+    if not (farthest <= FARTHEST).all():
+        return
+    low, high = (
+        np.minimum.reduceat(corners, start[:-1], axis=0),
+        np.maximum.reduceat(corners, start[:-1], axis=0),
+    )
+    extent = (high - low).max(axis=1)
+    for facet in np.flatnonzero(extent < _SMALLEST).tolist():
+        words = f"{called(facet, names)} is {extent[facet]:.3g} m large (expected {_SMALLEST:g} or more)"
+        yield Problem(words, mesh.path, int(mesh.lines[facet]))
 
 
 def _places(spec: DisplayFile) -> Places | None:
@@ -87,11 +113,12 @@ def _places(spec: DisplayFile) -> Places | None:
 
 def _in_world(mesh: PolygonMesh, spec: DisplayFile) -> FloatArray:
     """Corners (C, 3) in world metres, every sum in a fixed order."""
-    corners = mesh.vertices[mesh.corners] * spec.metres
-    if spec.transform is None:
-        return corners
-    matrix = spec.transform.array
-    return np.stack([dot(corners, row[:3]) + row[3] for row in matrix[:3]], axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):  # `_beyond_measure` tells of it
+        corners = mesh.vertices[mesh.corners] * spec.metres
+        if spec.transform is None:
+            return corners
+        matrix = spec.transform.array
+        return np.stack([dot(corners, row[:3]) + row[3] for row in matrix[:3]], axis=1)
 
 
 def _axes(
@@ -116,7 +143,7 @@ def _rasters(
     for facet, choice in spec.facets.items():
         if choice.facet_pixels is not None:
             asked[facet - 1] = choice.facet_pixels
-    return rasters(corners, start, right, down, spec.resolution.pixels_per_metre or 1.0, asked)
+    return rasters(corners, start, right, down, spec.resolution.density or 1.0, asked)
 
 
 def _unknown_facets(count: int, spec: DisplayFile) -> Iterator[Problem]:
@@ -143,16 +170,20 @@ def _useless_ups(normal: FloatArray, names: Sequence[str], spec: DisplayFile) ->
             )
 
 
-def _impossible_sizes(size: Int32Array, names: Sequence[str], spec: DisplayFile) -> Iterator[Problem]:
+def _impossible_sizes(
+    size: Int32Array, extent: float, names: Sequence[str], spec: DisplayFile
+) -> Iterator[Problem]:
     for facet in np.flatnonzero(((size < 1) | (size > MOST_PIXELS)).any(axis=1)):
         width, height = ("less than 1" if n < 1 else f"over {MOST_PIXELS}" if n > MOST_PIXELS else str(n)
                          for n in size[facet])  # fmt: skip
+        mistaken = (size[facet] > MOST_PIXELS).any() and spec.units == "m" and extent > 10
+        hint = f"; is the mesh in another unit? units: {likely_unit(extent)}" if mistaken else ""
         own = spec.facets.get(int(facet) + 1)
-        key = next(name for name in ("facet_pixels", "pixels_per_metre") if getattr(spec.resolution, name))
+        key = next(name for name in type(spec.resolution).model_fields if getattr(spec.resolution, name))
         yield spec.source.problem(
             ("facets", int(facet) + 1, "facet_pixels") if own and own.facet_pixels else ("resolution", key),
             f"makes {called(int(facet), names)} {width} × {height} pixels "
-            f"(expected 1 to {MOST_PIXELS} a side)",
+            f"(expected 1 to {MOST_PIXELS} a side{hint})",
         )
 
 

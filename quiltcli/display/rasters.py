@@ -17,6 +17,8 @@ from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross
 MOST_PIXELS = 65536  # a side
 LEVEL = math.sin(math.radians(1))
 _TIE = 1e-6
+# Pixels a facet may be wider than a whole number of them, for densities and coordinates of six digits.
+_ROUNDED = 2e-3
 _PAIRS_AT_ONCE = 2_000_000
 
 
@@ -166,7 +168,7 @@ def rasters(
     given: BoolArray = facet_pixels > 0
     exact = spans * pixels_per_metre
     # A hair over a whole number is rounding, not another pixel.
-    counted = np.where(exact < 1 - _TIE, 0, np.clip(np.ceil(exact - _TIE), 1, MOST_PIXELS + 1))
+    counted = np.where(exact < 1 - _TIE, 0, np.clip(np.ceil(exact - _ROUNDED), 1, MOST_PIXELS + 1))
     size = np.where(given, facet_pixels, counted)
     pitch = np.where(given, spans / np.maximum(size, 1), 1 / pixels_per_metre)
     return Rasters(

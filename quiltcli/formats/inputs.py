@@ -57,6 +57,33 @@ def read_input(path: Path | str, error: type[QuiltError], kind: str = "") -> byt
     return data
 
 
+FOREIGN = (
+    *(
+        ".fbx",
+        ".blend",
+        ".abc",
+        ".usd",
+        ".usda",
+        ".usdc",
+        ".usdz",
+        ".dae",
+        ".3ds",
+        ".max",
+        ".ma",
+        ".mb",
+        ".c4d",
+    ),
+    *(".3mf", ".x3d", ".wrl", ".step", ".stp", ".iges", ".igs", ".skp", ".lwo", ".hip", ".dxf", ".dwg"),
+)
+"""Suffixes of scenes that this program does not read, and that others export from."""
+
+
+def foreign_fault(path: Path | str) -> str:
+    """What to do with a file of another program's own format, empty for any other file."""
+    suffix = Path(path).suffix.lower()
+    return f"is a {suffix} file, which is not read (export as GLB)" if suffix in FOREIGN else ""
+
+
 def check_input(path: Path | str, error: type[QuiltError], kind: str = "") -> None:
     """Raise unless a library that opens files by name will find a regular file there."""
     open_input(path, error, kind).close()

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.errors import MissingExtraError, OutputError, Problem
+from quiltcli.errors import OutputError, Problem, missing_extra
 from quiltcli.formats.whole import make_folder, whole_file
 
 BT709 = 1
@@ -79,8 +79,7 @@ def _av() -> Any:
     try:
         import av
     except ImportError:
-        words = "a film needs PyAV, which is not installed (pip install quiltcli[video])"
-        raise MissingExtraError(words) from None
+        raise missing_extra("a film", "PyAV", "video") from None
     return av
 
 

@@ -6,7 +6,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-_NAME = re.compile(r"(?P<kind>[A-Za-z]+)_(?P<number>\d+)(?:\.(?P<eye>left|right))?\.(?P<frame>-?\d{4,})\.exr")
+_NAME = re.compile(
+    r"(?P<kind>[A-Za-z]+)_(?P<number>\d{1,9})(?:\.(?P<eye>left|right))?\.(?P<frame>-?\d{4,9})\.exr"
+)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,22 @@ LARGEST = 2048
 """Pixels a preview has at most in width and height; a picture of 16 bits, made to be shown, has them all."""
 DEPTHS = (8, 16)
 FORMATS = {".png": "png", ".tif": "tiff", ".tiff": "tiff"}
+_OTHER_PICTURES = (
+    ".jpg",
+    ".jpeg",
+    ".exr",
+    ".webp",
+    ".gif",
+    ".bmp",
+    ".tga",
+    ".dpx",
+    ".hdr",
+    ".mp4",
+    ".mov",
+    ".svg",
+)
 _FIELD = re.compile("#+")
+_LAST_NUMBER = re.compile(r".*?(-?\d+)")
 _STRIP = 1 << 21  # pixels that go through a view together
 
 
@@ -180,6 +195,13 @@ def preview_paths(images: Sequence[Path], output: Path, kind: str | None = None)
     """
     images = _every_frame(images)
     named = FORMATS.get(output.suffix.lower())
+    if named is None and output.suffix.lower() in _OTHER_PICTURES and not output.is_dir():
+        known = ", ".join(FORMATS)
+        raise OutputError(
+            Problem(f"has the suffix {output.suffix!r}, expected {known} or a folder", str(output))
+        )
+    if named is not None and _FIELD.search(output.name):
+        return [(image, _numbered(output, image)) for image in images]
     if named is None:
         pairs = [(image, output / f"{image.stem}.{'tif' if kind == 'tiff' else 'png'}") for image in images]
         if len({picture for _, picture in pairs}) < len(pairs):
@@ -194,6 +216,15 @@ def preview_paths(images: Sequence[Path], output: Path, kind: str | None = None)
         raise OutputError(Problem(f"is a name for a {named} picture, not for {kind}", file=str(output)))
     make_folder(output.parent)
     return [(images[0], output)]
+
+
+def _numbered(output: Path, image: Path) -> Path:
+    """The picture of an image of a sequence: `#` in its name becomes the image's number."""
+    match = _LAST_NUMBER.fullmatch(image.stem)
+    if match is None:
+        raise OutputError(Problem(f"has no frame number to stand for # in {output.name}", file=str(image)))
+    make_folder(output.parent)
+    return output.with_name(_FIELD.sub(match[1], output.name))
 
 
 def _every_frame(images: Sequence[Path]) -> list[Path]:

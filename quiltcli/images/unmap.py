@@ -21,7 +21,7 @@ from quiltcli.images.window import frame_size, whole_frame
 from quiltcli.job.job import LOSSLESS
 from quiltcli.layout import Layout, pixel_owners
 
-_FRAME = re.compile(r".*\.(-?\d+)")
+_FRAME = re.compile(r".*\.(-?\d{1,9})")
 
 
 @dataclass(frozen=True)

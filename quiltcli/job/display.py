@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -110,17 +112,52 @@ class TransformSpec(Model):
             yield ("matrix",), "flattens space (its determinant is 0)"
 
 
+_LENGTH = re.compile(r"\s*(\d{1,9}(?:\.\d{1,9})?)(?:\s*/\s*(\d{1,9}))?\s*(mm|cm|m|in|ft)\s*")
+_EXACT = {name: Fraction(str(metres)) for name, metres in UNITS.items()}
+
+
+def read_length(text: str) -> Fraction | None:
+    """Metres of a length such as `6 mm` or `1/6 mm`, exactly; None of any other text."""
+    match = _LENGTH.fullmatch(text)
+    if match is None or match[2] is not None and not int(match[2]):
+        return None
+    return Fraction(match[1]) / Fraction(match[2] or 1) * _EXACT[match[3]]
+
+
+def _pitch(value: Any) -> Any:
+    metres = read_length(value) if isinstance(value, str) else None
+    if metres is None:
+        raise complaint(f"expected a length such as 6 mm or 1/6 mm, got {describe(value)}")
+    if not Fraction(1, 10**9) <= metres <= 10**9:
+        raise complaint(f"must be from 1e-09 to 1e+09 metres, got {describe(value)}")
+    return value
+
+
 class ResolutionSpec(Model):
-    """How many pixels the facets have: one of the two keys."""
+    """How many pixels the facets have: one of these keys."""
 
     pixels_per_metre: Positive | None = None
     """How dense the pixels are on every facet, pixels a metre."""
+    pitch_mm: Positive | None = None
+    """Distance from pixel to pixel, on every facet, millimetres."""
+    pitch: Annotated[str, BeforeValidator(_pitch)] | None = None
+    """The same as a length: 6 mm, 0.25 in, or a fraction such as 1/6 mm."""
     facet_pixels: Size | None = None
     """Width and height of every facet, for panels, pixels."""
 
     def cross_checks(self) -> Iterator[Complaint]:
-        """One of the two."""
-        yield from exactly_one(self, "pixels_per_metre", "facet_pixels")
+        """One of them."""
+        yield from exactly_one(self, *type(self).model_fields)
+
+    @property
+    def density(self) -> float | None:
+        """Pixels a metre, to the last bit of what was written; None where facets have sizes of their own."""
+        if self.pixels_per_metre is not None:
+            return self.pixels_per_metre
+        if self.pitch_mm is not None:
+            return float(1000 / Fraction(str(self.pitch_mm)))
+        length = read_length(self.pitch) if self.pitch is not None else None
+        return None if length is None else float(1 / length)
 
 
 class PlaceOnPage(Model):

@@ -25,7 +25,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 from pydantic_core import core_schema as cs
 
-from quiltcli.formats.inputs import name_fault
+from quiltcli.formats.inputs import foreign_fault, name_fault
 from quiltcli.formats.yaml.source import Source, shorten
 
 # A path below a model, and what is wrong with the value there.
@@ -267,7 +267,8 @@ class ExistingFile:
         path = located(value, info)
         if self.suffixes and path.suffix.lower() not in self.suffixes:
             got = f"the suffix {path.suffix!r}" if path.suffix else f"{path.name!r}, which has no suffix"
-            raise complaint(f"expected {self.what} ({', '.join(self.suffixes)}), got {got}")
+            hint = " (export it as GLB)" if foreign_fault(path) and set(MESHES) & set(self.suffixes) else ""
+            raise complaint(f"expected {self.what} ({', '.join(self.suffixes)}), got {got}{hint}")
         if info.context is None:
             return path
         if path.is_dir():

@@ -21,7 +21,7 @@ from dataclasses import replace
 from typing import Any
 
 from quiltcli import __version__
-from quiltcli.errors import CheckFailedError, JobError, MissingExtraError, Problem, QuiltError, raise_all
+from quiltcli.errors import CheckFailedError, JobError, Problem, QuiltError, missing_extra, raise_all
 from quiltcli.job import JobFile
 from quiltcli.render.farm_task import Inputs, Task, inputs_fault, render_task
 from quiltcli.render.farm_watch import Watch
@@ -66,7 +66,7 @@ def render_on(
     folder = (options.folder or job.output.directory).absolute()
     options = replace(options, folder=folder)
     ready = prepare(job, options)
-    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
+    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage, options.frames)):
         listener.say(notice)
     listener.begin(len(ready.views))
     if options.dry_run:
@@ -90,8 +90,7 @@ def _distributed() -> Any:
     try:
         import distributed
     except ImportError:
-        words = "--scheduler needs dask.distributed, which is not installed (pip install quiltcli[dist])"
-        raise MissingExtraError(words) from None
+        raise missing_extra("--scheduler", "dask.distributed", "dist") from None
     return distributed
 
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from quiltcli.display import pitch_of
+from quiltcli.display import Facets
+from quiltcli.display.notices import display_notices
 from quiltcli.geometry import BoolArray
+from quiltcli.job import JobFile
+from quiltcli.job.frames import format_frames
+from quiltcli.layout import Layout
+from quiltcli.render.needs import disk_warnings
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words
 from quiltcli.viewer.view import viewers_of
@@ -25,25 +30,32 @@ def frame_warnings(stage: Stage, viewer: Viewer, lit: BoolArray, pairs: int, vis
         yield words
 
 
-def stage_warnings(stage: Stage) -> Iterator[str]:
-    """What is worth a second look before rendering starts."""
-    layout = stage.layout
-    least, greatest = pitch_of(layout.du[layout.page >= 0], layout.dv[layout.page >= 0])
-    if least < 0.1 or greatest > 100:
+def stage_warnings(stage: Stage, frames: Sequence[int] | None = None) -> Iterator[str]:
+    """What is worth a second look before frames (the job's by default) are drawn, and after the scene's notices."""
+    yield from job_warnings(stage.job, stage.facets, stage.layout, frames)
+
+
+def job_warnings(
+    job: JobFile, facets: Facets, layout: Layout, frames: Sequence[int] | None = None
+) -> Iterator[str]:
+    """The same of a job of which nothing is set up yet but its display and its layout."""
+    yield from display_notices(facets)
+    if job.render.bleed > layout.padding:
         yield (
-            f"the pixel pitch is {least:.3g} to {greatest:.3g} mm, outside 0.1 to 100 mm:"
-            " are the display's units and resolution right?"
+            f"the bleed of {job.render.bleed} pixels is wider than the layout's padding of"
+            f" {layout.padding}: neighbours share what lies between them"
         )
-    if stage.job.render.bleed > stage.layout.padding:
-        yield (
-            f"the bleed of {stage.job.render.bleed} pixels is wider than the layout's padding of"
-            f" {stage.layout.padding}: neighbours share what lies between them"
-        )
-    viewers = viewers_of(stage.job, stage.job.frames[:1])
-    if stage.job.render.depth == "planar" and not all(viewer.aimed for viewer in viewers):
+    viewers = viewers_of(job, job.frames[:1])
+    if job.render.depth == "planar" and not all(viewer.aimed for viewer in viewers):
         yield (
             "the path does not say where the head looks, on which no picture for one eye depends; depth is"
             " measured along the line to the display's middle (render.depth: radial measures the distance)"
         )
+    others = sorted(set(frames or ()) - set(job.frames))
+    if others:
+        known = format_frames(job.frames)
+        words = f"frame {others[0]} is" if len(others) == 1 else f"frames {format_frames(others)} are"
+        yield f"{words} not among the job's frames {known}: drawn all the same, with the viewer where its path says"
+    yield from disk_warnings(job, layout, frames)
     if not has_embree():
         yield "embreex is not installed: triangles are sorted to facets without it, which takes longer"

@@ -129,7 +129,7 @@ def render(
     options, listener = options or RenderOptions(), listener or Listener()
     start = time.perf_counter()
     ready = prepare(job, options)
-    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage)):
+    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage, options.frames)):
         listener.say(notice)
     if options.dry_run:
         return []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -136,6 +136,7 @@ def _file_scene(spec: SceneFile) -> Scene:
     for index, item in enumerate(spec.objects):
         try:
             _add_object(gathered, item, assets)
+            gathered.notices += _bright(index, item)
         except SceneError as error:
             key = "animation" if isinstance(error, _AnimationError) else "mesh"
             problems += [spec.source.problem(("objects", index, key), str(p)) for p in error.problems]
@@ -184,6 +185,15 @@ def _playing(item: ObjectSpec, asset: Asset) -> Playing | None:
 
 def _lights_of(asset: Asset, playing: Playing | None, time: float | None = None) -> tuple[FileLight, ...]:
     return () if asset.model is None else gltf_lights(asset.model, None if playing is None else time, playing)
+
+
+def _bright(index: int, item: ObjectSpec) -> Iterator[str]:
+    """A colour above 1 gives off more light than falls on it: a number of 8 bits, most likely."""
+    color = item.material.color if item.material is not None else None
+    if color is not None and max(color) > 1 and not item.material.unlit:
+        text = ", ".join(f"{part:g}" for part in color)
+        how = "divide 8-bit values by 255 and make them linear" if max(color) > 2 else "the brightest is 1"
+        yield f"objects[{index}].material.color [{text}] is above 1: it reflects more light than there is ({how})"
 
 
 def _baked(parts: Sequence[Part], mode: str, path: Path) -> Baked:

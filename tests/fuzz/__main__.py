@@ -55,13 +55,17 @@ def _examine(task: tuple[Kind, int, Path, int]) -> list[Finding]:
 
 def _keep(finding: Finding, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    text = f"{finding.kind} {finding.seed}\nquilt {finding.command}\n{finding.fault}\n\n{finding.output[:5000]}"
+    text = (
+        f"{finding.kind} {finding.seed}\nquilt {finding.command}\n{finding.fault}\n\n{finding.output[:5000]}"
+    )
     (folder / f"{finding.kind}_{finding.seed}.txt").write_text(text, encoding="utf-8", errors="replace")
 
 
 def main() -> None:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.fuzz", description=(__doc__ or "").partition("\n")[0]
+    )
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, help="stop after so long")
@@ -76,7 +80,9 @@ def main() -> None:
     for done, found in fuzz(given.count, given.seed, kinds, given.jobs, given.seconds):
         for finding in found:
             faults[finding.fault] += 1
-            print(f"{finding.kind} {finding.seed}: {finding.fault}\n  quilt {finding.command[:200]}", flush=True)
+            print(
+                f"{finding.kind} {finding.seed}: {finding.fault}\n  quilt {finding.command[:200]}", flush=True
+            )
             print(*(f"    {line[:200]}" for line in finding.output.splitlines()[-3:]), sep="\n", flush=True)
             if given.keep:
                 _keep(finding, given.keep)

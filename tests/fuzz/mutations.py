@@ -27,9 +27,58 @@ WORDS = (
 )  # fmt: skip
 _NUMBER = re.compile(rb"(?<![A-Za-z_])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 VALUES: tuple[Any, ...] = (
-    *(0, 1, -1, 2, 7, 0.5, 1e-9, 1e-300, 1e300, 1e30, 1e9, 2**31, 2**31 - 1, 2**32, 2**63, 2**64, 10**25, -(2**31)),
-    *(float("nan"), float("inf"), -float("inf"), True, False, None, "", "x", [], {}, [[]], [0, 0, 0], [1, 2], [1e9] * 3),
-    *([1e-12] * 3, {"x": 1}, [None], ["x"], "1e5", "0x10", [0] * 1000, 90, 45, 4096, 65536, 1000000, 1e-6, "1-100"),
+    *(
+        0,
+        1,
+        -1,
+        2,
+        7,
+        0.5,
+        1e-9,
+        1e-300,
+        1e300,
+        1e30,
+        1e9,
+        2**31,
+        2**31 - 1,
+        2**32,
+        2**63,
+        2**64,
+        10**25,
+        -(2**31),
+    ),
+    *(
+        float("nan"),
+        float("inf"),
+        -float("inf"),
+        True,
+        False,
+        None,
+        "",
+        "x",
+        [],
+        {},
+        [[]],
+        [0, 0, 0],
+        [1, 2],
+        [1e9] * 3,
+    ),
+    *(
+        [1e-12] * 3,
+        {"x": 1},
+        [None],
+        ["x"],
+        "1e5",
+        "0x10",
+        [0] * 1000,
+        90,
+        45,
+        4096,
+        65536,
+        1000000,
+        1e-6,
+        "1-100",
+    ),
 )
 
 
@@ -48,8 +97,12 @@ def setting(rng: random.Random, job: str) -> str:
     place = rng.choice(list(_places(data)))
     key = ".".join(map(str, place))
     if rng.random() < 0.2:
-        key = rng.choice((key + ".x", "x." + key, key + "[0]", key + "[-1]", key + "[99999999999]", "." + key, key * 50))
-    value: str = rng.choice((json.dumps(rng.choice(VALUES)), rng.choice(NUMBERS), rng.choice(WORDS), "[" * 300, "*a", "&a [*a]"))
+        key = rng.choice(
+            (key + ".x", "x." + key, key + "[0]", key + "[-1]", key + "[99999999999]", "." + key, key * 50)
+        )
+    value: str = rng.choice(
+        (json.dumps(rng.choice(VALUES)), rng.choice(NUMBERS), rng.choice(WORDS), "[" * 300, "*a", "&a [*a]")
+    )
     return f"{key}={value}".replace("\0", "\\0")  # no argument of a process can hold one
 
 
@@ -93,7 +146,9 @@ def _yaml(data: bytes, rng: random.Random) -> bytes:
         tree = yaml.safe_load(data.decode())
         if rng.random() < 0.1 or not isinstance(tree, dict):
             return _text(data, rng)
-        return yaml.safe_dump(_tree(tree, rng), sort_keys=False, allow_unicode=True).encode("utf-8", "surrogatepass")
+        return yaml.safe_dump(_tree(tree, rng), sort_keys=False, allow_unicode=True).encode(
+            "utf-8", "surrogatepass"
+        )
     except (yaml.YAMLError, ValueError, RecursionError):
         return _text(data, rng)
 
@@ -145,7 +200,11 @@ def _bytes(data: bytes, rng: random.Random) -> bytes:
         edge = rng.choice((0, 1, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF))
         return data[:at] + struct.pack("<I", edge) + data[at + 4 :]
     if what == 4:
-        return data[:at] + struct.pack("<f", rng.choice((float("nan"), float("inf"), 1e38, 0.0, -1e-38))) + data[at + 4 :]
+        return (
+            data[:at]
+            + struct.pack("<f", rng.choice((float("nan"), float("inf"), 1e38, 0.0, -1e-38)))
+            + data[at + 4 :]
+        )
     return data[:at] + bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 :]
 
 
@@ -163,7 +222,11 @@ def _exr(data: bytes, rng: random.Random) -> bytes:
         place = rng.randrange(start, end)
         return data[:place] + bytes([rng.choice((0xFF, 0x41, 0x80, 0))]) + data[place + 1 :]
     if what == 1:  # the size of the value
-        return data[: at.end()] + struct.pack("<i", rng.choice((-1, 0, 1, 3, 4, 2**31 - 1))) + data[at.end() + 4 :]
+        return (
+            data[: at.end()]
+            + struct.pack("<i", rng.choice((-1, 0, 1, 3, 4, 2**31 - 1)))
+            + data[at.end() + 4 :]
+        )
     place = at.end() + 4 + rng.choice((0, 0, 4, 8, 12))
     edge = rng.choice((0, 1, 0xFF, 0xFFFF, 99999, 2**30, 2**31 - 1, 2**31, 2**32 - 1, 0x7FC00000))
     return data[:place] + struct.pack("<I", edge) + data[place + 4 :]

@@ -31,6 +31,12 @@ PYTHON = re.compile(
 )
 
 
+# The decoder's own note beside the program's sentence; it goes past Python.
+_DECODERS = re.compile(
+    r"^Warning: Exception raised reading pixel data for part \d+ - [A-Z][\w ]+$", re.MULTILINE
+)
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What came of a command.
@@ -55,7 +61,7 @@ class Outcome:
         if self.code < 0:
             name = signal.Signals(-self.code).name
             return f"killed by {name} after {self.seconds:.1f} s"
-        if found := PYTHON.search(self.output):
+        if found := PYTHON.search(_DECODERS.sub("", self.output)):
             return f"says {found[0]!r}"
         if self.code not in (0, 1, 2, 3, 4):
             return f"exit code {self.code}"

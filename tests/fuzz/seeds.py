@@ -168,7 +168,11 @@ def _mesh(suffix: str) -> tuple[str, ...]:
 
 
 def _map(suffix: str) -> tuple[str, ...]:
-    return (f"import map.{suffix} -o l.yaml", *_IMPORTED, f"import map.{suffix} -o l2.yaml --display display.yaml")
+    return (
+        f"import map.{suffix} -o l.yaml",
+        *_IMPORTED,
+        f"import map.{suffix} -o l2.yaml --display display.yaml",
+    )
 
 
 KINDS = (
@@ -218,8 +222,21 @@ def write_seeds(folder: Path) -> None:
         "pack display.yaml --method rows --size 80x80 -o layout.yaml",
         *(f"export layout.yaml -o map.{suffix}" for suffix in ("csv", "json", "obj", "mpcdi")),
         "render job.yaml -f 1-2 -j 1",
+        # Run once here, so that their modules need not be imported anew for every input.
+        "check job.yaml",
+        "info job.yaml",
+        "info m.obj",
+        "info m.gltf",
+        "info b.ply",
+        "import map.csv -o l.yaml",
+        "import map.mpcdi -o l.yaml",
+        "info out/quilt/page_01.0001.exr",
+        "export layout.yaml -o l.svg",
+        "preview out/quilt/page_01.0001.exr -o p.png",
+        "unmap out/quilt/page_01.0001.exr --layout layout.yaml -o cut",
+        "diff out/quilt/page_01.0001.exr out/quilt/page_01.0001.exr",
     ):
-        words = [str(folder / word) if "." in word or word == "out" else word for word in command.split()]
+        words = [str(folder / word) if "." in word or word == "cut" else word for word in command.split()]
         result = CliRunner().invoke(main, words)
         assert result.exit_code == 0, (command, result.output)
 

@@ -1,10 +1,11 @@
-"""What a file is: a display, a mesh, a layout, a scene, a job or an EXR image."""
+"""What a file is: a display, a mesh, a layout, a scene, a job, an EXR image or a render's output."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from quiltcli.analysis.info.record import Info
+from quiltcli.formats.inputs import name_fault
 from quiltcli.formats.mesh.read import SUFFIXES
 from quiltcli.job import file_kind
 
@@ -18,6 +19,10 @@ def describe(path: Path | str) -> Info:
         QuiltError: the file is missing, of no kind that is known, or wrong.
     """
     path = Path(path)
+    if not name_fault(path) and path.is_dir():
+        from quiltcli.analysis.info.outputs import output_info
+
+        return output_info(path)
     suffix = path.suffix.lower()
     if suffix == ".exr":
         from quiltcli.analysis.info.images import image_info

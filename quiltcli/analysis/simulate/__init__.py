@@ -31,6 +31,7 @@ from quiltcli.images.preview import block_means
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.projection.camera import aimed, camera_display, frame_display
 from quiltcli.render.crew import default_threads
+from quiltcli.render.notices import stage_warnings
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.view import views_of
 from quiltcli.viewer.viewer import Viewer
@@ -112,7 +113,7 @@ def simulate(
     """Look at the display with its images on, in some frames of a job.
 
     The images are those a render of the job has left, where there are any, else drawn in memory.
-    What of the scene is not drawn goes to `say`.
+    What a render would `say` of the job is said first.
 
     Raises:
         QuiltError: bad input, or images that cannot be read.
@@ -121,7 +122,7 @@ def simulate(
     views_of(job, frames)  # what is wrong with the path is said before anything is loaded
     sha = job_sha256(job)
     stage = set_stage(with_channels(job, ("rgba",)))
-    for notice in stage.scene.notices:
+    for notice in (*stage.scene.notices, *stage_warnings(stage, frames)):
         say(notice)
     threads = options.threads or default_threads()
     views = [view for view in stage.views(frames) if options.eye in ("", view.eye)]

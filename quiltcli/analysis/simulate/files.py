@@ -54,7 +54,7 @@ def write_pictures(
 ) -> Iterator[str]:
     """Take and write pictures; yields what there is to say of them, line by line.
 
-    What of the scene is not drawn goes to `say`.
+    What a render would say of the job goes to `say`.
 
     Raises:
         QuiltError: bad input, or a file that cannot be written.

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import MeshError, Problem
-from quiltcli.formats.inputs import read_input
+from quiltcli.formats.inputs import foreign_fault, read_input
 from quiltcli.formats.mesh.gltf import read_gltf_mesh
 from quiltcli.formats.mesh.mesh import PolygonMesh, check_display_mesh
 from quiltcli.formats.mesh.obj import read_obj
@@ -38,6 +38,8 @@ def read_mesh(path: Path | str) -> PolygonMesh:
     """
     path = Path(path)
     suffix = path.suffix.lower()
+    if fault := foreign_fault(path):
+        raise _error(path, fault)
     if suffix not in SUFFIXES:
         raise _error(path, f"unknown mesh format {path.suffix!r} (expected {', '.join(SUFFIXES)})")
     mesh = read_polygons(path) if suffix in READERS else read_gltf_mesh(path)

@@ -13,7 +13,7 @@ from yaml.reader import Reader, ReaderError
 from yaml.scanner import Scanner
 
 from quiltcli.errors import JobError, Problem
-from quiltcli.formats.inputs import read_input
+from quiltcli.formats.inputs import foreign_fault, read_input
 from quiltcli.formats.yaml.core import CoreResolver
 
 
@@ -35,6 +35,8 @@ def read_text(path: Path) -> str:
         JobError: the file is missing, no regular file, unreadable or not UTF-8.
     """
     raw = read_input(path, JobError)
+    if fault := foreign_fault(path):
+        raise JobError(Problem(fault, str(path)))
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from quiltcli.errors import MeshError, Problem, SceneError
-from quiltcli.formats.inputs import open_input
+from quiltcli.formats.inputs import foreign_fault, open_input
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.formats.mesh.read import READERS, read_polygons
@@ -93,6 +93,8 @@ def _gltf_asset(path: Path) -> Asset:
 def _check_file(path: Path) -> None:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
+        if fault := foreign_fault(path):
+            raise SceneError(Problem(fault, str(path)))
         found = f"unknown mesh format {path.suffix!r}" if suffix else "a mesh file without a suffix"
         raise SceneError(Problem(f"{found} (expected {', '.join(SUFFIXES)})", str(path)))
     with open_input(path, SceneError, "a mesh") as file:
