@@ -9,7 +9,7 @@ SEEN := out/demo/pictures
 DOCS := docs/pictures
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo pictures test test-long lint types format bench bench-docs packing-table golden schema docs dist clean
+.PHONY: help env demo pictures test test-long fuzz lint types format bench bench-docs packing-table golden schema docs dist clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -60,6 +60,9 @@ test: env lint types ## lint, types and all tests but the long ones
 
 test-long: env ## the tests that take minutes
 	$(PY) -m pytest -n 2 -m long
+
+fuzz: env ## spoil inputs of every kind and look for faults: minutes (COUNT=20000 SEED=7: as long as wanted)
+	$(PY) -m tests.fuzz --count $(or $(COUNT),2000) --seed $(or $(SEED),1) --keep out/fuzz
 
 lint: env ## mistakes and layout of the code (ruff), misspelt words (codespell)
 	$(PY) -m ruff check .

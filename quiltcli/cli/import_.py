@@ -27,14 +27,13 @@ def import_(
     picture: Path | None,
 ) -> None:
     """Make a layout from a pixel map: .obj, .csv, .json or .mpcdi."""
-    from quiltcli.display import load_display
-    from quiltcli.exchange.pixelmaps import read_map
-    from quiltcli.job import load_display_file
+    from quiltcli.exchange.pixelmaps import imported_map
     from quiltcli.layout import write_layout
     from quiltcli.layout.picture.picture import layout_picture
 
-    facets = load_display(load_display_file(display)) if display is not None else None
-    layout = read_map(file, facets, size=size, format_name=format_name)
+    layout, facets, notice = imported_map(file, display, size=size, format_name=format_name)
+    if notice:
+        click.echo(notice, err=True)
     write_layout(layout, output)
     if picture is not None:
         layout_picture(layout, picture, facets.names if facets else ())

@@ -34,7 +34,8 @@ def display_notices(facets: Facets) -> Iterator[str]:
         )
     extent = float(np.ptp(facets.corners, axis=0).max())
     if extent > _WIDEST:
-        yield f"the display is {extent:.4g} m large: is its mesh in another unit (units: {likely_unit(extent)}?)"
+        unit = likely_unit(extent)
+        yield f"the display is {extent:.4g} m large: is its mesh in another unit (units: {unit}?)"
 
 
 def likely_unit(metres: float) -> str:
@@ -55,8 +56,8 @@ def disagreeing(facets: Facets) -> list[tuple[int, int]]:
     _, which, times = np.unique(places, axis=0, return_inverse=True, return_counts=True)
     alone = times[which.reshape(-1)] == 1
     step = edges.end - edges.start
-    way_a = _ways(facets, edges.facet_a, edges.start, edges.end, step)
-    way_b = _ways(facets, edges.facet_b, edges.start, edges.end, step)
+    way_a = _ways(facets, edges.facet_a.astype(np.int64), edges.start, edges.end, step)
+    way_b = _ways(facets, edges.facet_b.astype(np.int64), edges.start, edges.end, step)
     shown = facets.enabled[edges.facet_a] & facets.enabled[edges.facet_b]
     same: BoolArray = alone & shown & (way_a == way_b)
     found = zip(edges.facet_a[same].tolist(), edges.facet_b[same].tolist(), strict=True)

@@ -43,7 +43,8 @@ def unmap(
 ) -> list[Path]:
     """Write the image of every facet on the given pages to `out`/facets; return the files.
 
-    Channels and attributes are those of the quilt, and its compression if that is lossless (else zip); `quilt:facet` and
+    Channels and attributes are those of the quilt, and its compression if that is lossless
+    (else zip); `quilt:facet` and
     `quilt:facet_from_world` are added. All files are looked at before the first is written.
 
     Args:

@@ -119,7 +119,7 @@ _EXACT = {name: Fraction(str(metres)) for name, metres in UNITS.items()}
 def read_length(text: str) -> Fraction | None:
     """Metres of a length such as `6 mm` or `1/6 mm`, exactly; None of any other text."""
     match = _LENGTH.fullmatch(text)
-    if match is None or match[2] is not None and not int(match[2]):
+    if match is None or (match[2] is not None and not int(match[2])):
         return None
     return Fraction(match[1]) / Fraction(match[2] or 1) * _EXACT[match[3]]
 

@@ -31,7 +31,7 @@ def frame_warnings(stage: Stage, viewer: Viewer, lit: BoolArray, pairs: int, vis
 
 
 def stage_warnings(stage: Stage, frames: Sequence[int] | None = None) -> Iterator[str]:
-    """What is worth a second look before frames (the job's by default) are drawn, and after the scene's notices."""
+    """What is worth a second look before frames (the job's by default) are drawn, scene apart."""
     yield from job_warnings(stage.job, stage.facets, stage.layout, frames)
 
 
@@ -55,7 +55,7 @@ def job_warnings(
     if others:
         known = format_frames(job.frames)
         words = f"frame {others[0]} is" if len(others) == 1 else f"frames {format_frames(others)} are"
-        yield f"{words} not among the job's frames {known}: drawn all the same, with the viewer where its path says"
+        yield f"{words} not among the job's frames {known} (the viewer is where its path goes on to)"
     yield from disk_warnings(job, layout, frames)
     if not has_embree():
         yield "embreex is not installed: triangles are sorted to facets without it, which takes longer"

@@ -189,11 +189,12 @@ def _lights_of(asset: Asset, playing: Playing | None, time: float | None = None)
 
 def _bright(index: int, item: ObjectSpec) -> Iterator[str]:
     """A colour above 1 gives off more light than falls on it: a number of 8 bits, most likely."""
-    color = item.material.color if item.material is not None else None
-    if color is not None and max(color) > 1 and not item.material.unlit:
-        text = ", ".join(f"{part:g}" for part in color)
-        how = "divide 8-bit values by 255 and make them linear" if max(color) > 2 else "the brightest is 1"
-        yield f"objects[{index}].material.color [{text}] is above 1: it reflects more light than there is ({how})"
+    material = item.material
+    if material is None or material.color is None or material.unlit or max(material.color) <= 1:
+        return
+    text = ", ".join(f"{part:g}" for part in material.color)
+    how = "divide 8-bit values by 255 and make them linear" if max(material.color) > 2 else "white is 1"
+    yield f"objects[{index}].material.color [{text}] reflects more light than falls on it ({how})"
 
 
 def _baked(parts: Sequence[Part], mode: str, path: Path) -> Baked:

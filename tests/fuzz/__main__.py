@@ -77,7 +77,8 @@ def main() -> None:
         os.environ.setdefault(name, "1")
     kinds = tuple(kind for kind in KINDS if given.kind is None or kind.name in given.kind)
     start, done, faults = time.monotonic(), 0, Counter[str]()
-    for done, found in fuzz(given.count, given.seed, kinds, given.jobs, given.seconds):
+    for number, found in fuzz(given.count, given.seed, kinds, given.jobs, given.seconds):
+        done = number
         for finding in found:
             faults[finding.fault] += 1
             print(

@@ -1,5 +1,7 @@
 """Ways to spoil an input that keep most of its structure, so that the damage gets past the first check."""
 
+# ruff: noqa: E501 - tables are easier to read unbroken
+
 from __future__ import annotations
 
 import json
@@ -210,9 +212,7 @@ def _bytes(data: bytes, rng: random.Random) -> bytes:
 
 def _exr(data: bytes, rng: random.Random) -> bytes:
     """The header of an EXR image, mostly: an attribute's size, value or name."""
-    ends = data.find(b"\0\0", 8)
-    header = min(len(data), 1500) if ends < 0 else min(len(data), 1500)
-    names = [match for match in re.finditer(rb"([\w:]+)\0(\w+)\0", data[:header])]
+    names = list(re.finditer(rb"([\w:]+)\0(\w+)\0", data[:1500]))
     if not names or rng.random() < 0.3:
         return _bytes(data, rng)
     at = rng.choice(names)

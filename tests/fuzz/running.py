@@ -1,5 +1,7 @@
 """One input, run in a process of its own that may take so much time and memory and no more."""
 
+# ruff: noqa: E501 - tables are easier to read unbroken
+
 from __future__ import annotations
 
 import os

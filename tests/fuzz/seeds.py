@@ -1,5 +1,7 @@
 """Good inputs of every kind, small, and the commands that read each kind: what the fuzzer starts from."""
 
+# ruff: noqa: E501 - tables are easier to read unbroken
+
 from __future__ import annotations
 
 import shutil
@@ -128,7 +130,7 @@ endsolid s
 """
 GLTF = """\
 {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
- "nodes": [{"mesh": 0, "translation": [0, 0, -1], "scale": [1, 1, 1], "children": [1]}, {"mesh": 0, "rotation": [0, 0, 0, 1]}],
+ "nodes": [{"mesh": 0, "translation": [0, 0, -1], "scale": [1, 1, 1], "children": [1]}, {"mesh": 0, "translation": [2, 0, 0], "rotation": [0, 0, 0, 1]}],
  "meshes": [{"name": "m", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0, "mode": 4}]}],
  "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0.2, 1], "metallicFactor": 0}}],
  "buffers": [{"byteLength": 42, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIA"}],
@@ -184,7 +186,7 @@ KINDS = (
     Kind("scene", "scene.yaml", "yaml", ("check scene.yaml", "info scene.yaml", _RENDER)),
     Kind("layout", "layout.yaml", "yaml", ("check layout.yaml", "info layout.yaml", *_EXPORTS)),
     Kind("yaml-text", "job.yaml", "text", ("check job.yaml", "info job.yaml")),
-    Kind("set", "", "set", ("render job.yaml --dry-run",)),
+    Kind("set", "", "set", ("render job.yaml --dry-run --overwrite",)),
     Kind("obj", "m.obj", "text", _mesh("obj")),
     Kind("mtl", "m.mtl", "text", ("info m.obj",)),
     Kind("ply", "m.ply", "text", _mesh("ply")),
@@ -197,7 +199,7 @@ KINDS = (
     Kind("exr", "out/quilt/page_01.0001.exr", "exr", (
         "info out/quilt/page_01.0001.exr", "info --json out/quilt/page_01.0001.exr",
         "preview out/quilt/page_01.0001.exr -o p.png", "diff out/quilt/page_01.0001.exr out/quilt/page_01.0002.exr",
-        "unmap out/quilt/page_01.0001.exr --layout layout.yaml -o cut", "render job.yaml -f 1 -j 1 --resume")),
+        "unmap out/quilt/page_01.0001.exr --layout layout.yaml -o cut2", "render job.yaml -f 1 -j 1 --resume")),
     Kind("csv", "map.csv", "text", _map("csv")),
     Kind("json", "map.json", "json", _map("json")),
     Kind("json-text", "map.json", "text", _map("json")),

@@ -22,7 +22,9 @@ def output_info(path: Path) -> Info:
         OutputError: nothing in the folder says that a render wrote it.
     """
     if not (is_regular(path / "job.yaml") and is_regular(path / "report.json")):
-        words = "is a directory without a render in it (expected a file, or a folder with job.yaml and report.json)"
+        words = (
+            "is a directory without a render in it (expected a file, or one with job.yaml and report.json)"
+        )
         raise OutputError(Problem(words, file=str(path)))
     entries = _entries(path / "report.json")
     images = [file for folder in ("quilt", "facets") for file in (path / folder).glob("*.exr")]
@@ -30,21 +32,23 @@ def output_info(path: Path) -> Info:
     counts = Counter(name.kind for name in names)
     frames = sorted({name.frame for name in names})
     size = sum(file.stat().st_size for file in images)
+    reported = sorted({int(entry["frame"]) for entry in entries})
+    warnings = [f"frame {entry['frame']}: {text}" for entry in entries for text in entry["warnings"]]
     data = {
         "path": str(path),
         "frames": frames,
-        "reported_frames": sorted({entry["frame"] for entry in entries}),
+        "reported_frames": reported,
         "images": {kind: counts[kind] for kind in ("page", "facet")},
         "bytes": size,
-        "warnings": [f"frame {entry['frame']}: {text}" for entry in entries for text in entry["warnings"]],
+        "warnings": warnings,
     }
     lines = [
         ("frames", f"{format_frames(frames)} ({len(frames):,})" if frames else "none"),
-        ("reported", format_frames(data["reported_frames"]) or "none"),
+        ("reported", format_frames(reported) or "none"),
         ("images", f"{counted(counts['page'], 'page')}, {counted(counts['facet'], 'facet image')}"),
         ("size", bytes_text(size)),
         ("job", str(path / "job.yaml")),
-        *(("warning", text) for text in data["warnings"]),
+        *(("warning", text) for text in warnings),
     ]
     columns = ("frame", "lit facets", "pixels that show it", "seconds")
     rows = [
@@ -55,7 +59,7 @@ def output_info(path: Path) -> Info:
     return Info("output", data, lines, columns, rows)
 
 
-_FIELDS = {
+_FIELDS: dict[str, Any] = {
     "frame": int,
     "lit_facets": int,
     "visible_pixels": int,
@@ -70,7 +74,7 @@ def _entries(path: Path) -> list[dict[str, Any]]:
         entries = json.loads(read_input(path, OutputError))["frames"]
         good = all(isinstance(entry[key], kind) for entry in entries for key, kind in _FIELDS.items())
     except (ValueError, KeyError, TypeError, RecursionError):
-        good = False
+        entries, good = [], False
     if not good:
         raise OutputError(Problem("is no report of a render", file=str(path)))
     return list(entries)

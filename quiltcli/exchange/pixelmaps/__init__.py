@@ -1,12 +1,20 @@
 """Pixel maps: the layout in the forms other tools of the field read and write."""
 
-from quiltcli.exchange.pixelmaps.formats import FORMATS, Format, known_display, read_map, write_map
+from quiltcli.exchange.pixelmaps.formats import (
+    FORMATS,
+    Format,
+    imported_map,
+    known_display,
+    read_map,
+    write_map,
+)
 from quiltcli.exchange.pixelmaps.naming import facet_label, page_files, parse_label
 
 __all__ = [
     "FORMATS",
     "Format",
     "facet_label",
+    "imported_map",
     "known_display",
     "page_files",
     "parse_label",

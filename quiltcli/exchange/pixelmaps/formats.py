@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from quiltcli.display import Facets, load_display
@@ -125,6 +125,33 @@ def read_map(
     layout = entry.read(path, facets, size)
     raise_all(LayoutError, file_problems(layout, path))
     return layout
+
+
+def imported_map(
+    path: str | Path,
+    display: Path | None,
+    *,
+    size: tuple[int, int] | None = None,
+    format_name: str | None = None,
+) -> tuple[Layout, Facets | None, str]:
+    """A layout to write to a file, one that `check` accepts; with its display, and what is worth saying.
+
+    The display is the one named, else the one that the map names: it must fit, and if it is not there the
+    layout does not name it any more.
+
+    Raises:
+        QuiltError: as for `read_map`, or the display is wrong.
+    """
+    facets = load_display(load_display_file(display)) if display is not None else None
+    layout = read_map(path, facets, size=size, format_name=format_name)
+    if facets is not None or not layout.display:
+        return layout, facets, ""
+    facets = known_display(layout)
+    if facets is None:
+        words = f"the display {layout.display} that the map names is not there: the layout names none"
+        return replace(layout, display="", display_sha256=""), None, words
+    align(replace(layout, path=str(path), place=None, file_row=None), facets)
+    return layout, facets, ""
 
 
 def known_display(layout: Layout, path: Path | None = None) -> Facets | None:
