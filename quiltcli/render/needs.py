@@ -20,13 +20,13 @@ def demand_memory(job: JobFile, layout: Layout, frames: Sequence[int] | None = N
     Args:
         job: says which channels there are.
         layout: says how many pixels.
-        frames: the frames to draw, the job's by default; of two or more, two are in memory at a time.
+        frames: the frames to draw, the job's by default; of two views or more, two are in memory at a time.
 
     Raises:
         JobError: they do not; the sentence says how much is needed and what would need less.
     """
     pixels, free = int(layout.page_offset[-1]), free_memory()
-    sheets = min(len(job.frames if frames is None else frames), 2)
+    sheets = min(_views(job, frames), 2)
     needed = pixels * (owner_bytes(layout) + sheets * pixel_bytes(job))
     if free is None or needed <= free:
         return
@@ -44,14 +44,19 @@ def pixel_bytes(job: JobFile) -> int:
     return sum(np.dtype(dtype).itemsize for dtype, _ in exr_channels(job.output.channels).values())
 
 
+def _views(job: JobFile, frames: Sequence[int] | None) -> int:
+    """How many views are drawn: one a frame, or one a frame and eye."""
+    return len(job.frames if frames is None else frames) * (2 if job.is_stereo else 1)
+
+
 def disk_warnings(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> Iterator[str]:
     """A sentence when the images, not compressed, are larger than the disk has room for."""
     pixels = int(layout.page_offset[-1]) * job.output.quilts
     pixels += int(layout.size.astype(np.int64).prod(axis=1)[layout.page >= 0].sum()) * job.output.facets
-    count = len(job.frames if frames is None else frames)
+    count = _views(job, frames)
     needed, free = count * pixels * pixel_bytes(job), free_disk(job.output.directory)
     if free is not None and needed > free:
         yield (
-            f"the images of {count:,} frame{'s' * (count > 1)} hold {bytes_text(needed)} before compression,"
+            f"the images of {count:,} view{'s' * (count > 1)} hold {bytes_text(needed)} before compression,"
             f" and {bytes_text(free)} are free in {job.output.directory}"
         )

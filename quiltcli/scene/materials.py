@@ -81,6 +81,6 @@ def material_table(surfaces: Sequence[Surface]) -> Materials:
 
 
 def _plausible(values: Sequence[Any], most: float = FARTHEST) -> Float32Array:
-    """Values of mesh files within what light can be: not negative, not beyond `most`, 0 for what is no number."""
+    """Values of mesh files within what light can be: from 0 to `most`, 0 for what is no number."""
     found = np.nan_to_num(np.array(values, dtype=np.float64), nan=0.0, posinf=most)
     return np.clip(found, 0.0, most).astype(np.float32)

@@ -257,7 +257,7 @@ def test_other_formats(tmp_path):
 def test_the_table_has_a_line_for_each_channel(tmp_path):
     result = compare(tmp_path, image(), image(Z={(300, 3): 3.0, (301, 0): NAN}))
     assert diff_rows(result) == [
-        ("a.exr", "0", "R", "fail", "0", "0", "0", "0", "0", ""),
+        ("a.exr", "0", "R", "match", "0", "0", "0", "0", "0", ""),
         ("a.exr", "0", "Z", "fail", "2", "0.000666889", "0.0365209", "2", "1", "3, 300"),
     ]
 

@@ -46,9 +46,15 @@ def test_directory(tmp_path):
     assert message(tmp_path / "dir.obj") == "dir.obj: is a directory (expected a mesh file)"
 
 
+@pytest.mark.parametrize("suffix", ["fbx", "blend", "abc", "usdc", "FBX"])
+def test_files_of_other_programs_say_what_to_do(tmp_path, suffix):
+    found = message(written(tmp_path, f"car.{suffix}", b"\xe8\x00"))
+    assert found == f"car.{suffix}: is a .{suffix.lower()} file, which is not read (export as GLB)"
+
+
 def test_unknown_suffix(tmp_path):
-    found = message(written(tmp_path, "car.fbx", "x"))
-    assert found == "car.fbx: unknown mesh format '.fbx' (expected .obj, .ply, .off, .stl, .gltf, .glb)"
+    found = message(written(tmp_path, "car.xyz", "x"))
+    assert found == "car.xyz: unknown mesh format '.xyz' (expected .obj, .ply, .off, .stl, .gltf, .glb)"
 
 
 def test_no_suffix(tmp_path):
