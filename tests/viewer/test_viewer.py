@@ -237,6 +237,11 @@ def test_csv_of_any_spreadsheet(tmp_path: Path, separator: str) -> None:
     assert viewer_at(track(tmp_path, text, look=(0.0, 0.0, -1.0)), 1).eye.tolist() == [1.5, 2, 3]
 
 
+def test_csv_with_decimal_commas(tmp_path: Path) -> None:
+    text = "frame;x;y;z\n1;1,5;-2,25;3\n"
+    assert viewer_at(track(tmp_path, text, look=(0.0, 0.0, -1.0)), 1).eye.tolist() == [1.5, -2.25, 3]
+
+
 def test_csv_places_beyond_any_display(tmp_path: Path) -> None:
     found = check_viewer(track(tmp_path, "1,0,0,0,0,0,-1\n2,1e30,0,0,0,0,-1\n"), [1, 2])
     assert [problem.message for problem in found] == [

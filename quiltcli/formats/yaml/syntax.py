@@ -105,6 +105,8 @@ def _words(problem: str, context: str | None, start: Any) -> str:
     """PyYAML's problem, in the words of people who write YAML and do not parse it."""
     if problem in _HINTS:
         return _HINTS[problem]
+    if problem.startswith(("expected escape sequence", "found unknown escape character")):
+        return r"a \ in double quotes starts an escape (write the text in single quotes, or a path with /)"
     if problem.startswith("expected <block end>"):
         return "this does not fit what stands before it (check the indentation and the quotes)"
     first = re.match(r"found character (.+) that cannot start any token", problem)
