@@ -81,7 +81,7 @@ _BOMB = b"a0: &a0 [x]\n" + b"".join(
          "a.yaml:3:3: this does not fit what stands before it (check the indentation and the quotes)"),
         (b'a: "C:\\scenes\\ball.obj"\n', "a.yaml:1:8: a \\ in double quotes starts an escape"
          " (write the text in single quotes, or a path with /)"),
-        (b'a: "\\users"\n', "a.yaml:1:6: a \\ in double quotes starts an escape"
+        (b'a: "\\users"\n', "a.yaml:1:7: a \\ in double quotes starts an escape"
          " (write the text in single quotes, or a path with /)"),
         (b"a: @x\n", "a.yaml:1:4: a value cannot start with '@' (put it in quotes)"),
         (b"a: 1\nb: {<<: 3}\n", "a.yaml:2:9: b: '<<' merges mappings only"),
