@@ -35,7 +35,9 @@ def quilt(*arguments, code=0):
 @pytest.mark.parametrize("name", ["m.csv", "m.json", "m.mpcdi"])
 def test_out_and_in_again(folder, name):
     assert quilt("export", "layout.yaml", "-o", name) == [name]
-    assert quilt("import", name, "-o", "again.yaml", "--picture", "again.svg") == ["8 facets on 2 pages"]
+    gone = "the display flat.yaml that the map names is not there: the layout names none"
+    told = [gone, "8 facets on 2 pages"] if name == "m.json" else ["8 facets on 2 pages"]
+    assert quilt("import", name, "-o", "again.yaml", "--picture", "again.svg") == told
     before, after = read_layout("layout.yaml"), read_layout("again.yaml")
     np.testing.assert_array_equal(before.quilt_from_facet, after.quilt_from_facet)
     np.testing.assert_array_equal(before.origin, after.origin)
