@@ -13,6 +13,7 @@ from quiltcli.layout.check import check_layout
 from quiltcli.layout.layout import PIXEL_TOLERANCE, Layout
 
 # Facet raster → quilt by turning the picture clockwise 0, 1, 2, 3 quarter turns; y runs down.
+_FARTHEST = 1e9  # pixels
 QUARTER_TURNS: FloatArray = np.array(
     [[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]], dtype=np.float64
 )
@@ -135,6 +136,11 @@ def _fit(facets: Facets, row: int, pixels: FloatArray, quilt: FloatArray) -> _Fi
 
 def _affine(pixels: FloatArray, quilt: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Least-squares map quilt = linear @ pixels + offset; refuses more than 0.01 pixel of residual."""
+    farthest = float(np.abs(quilt).max())
+    if farthest > _FARTHEST:
+        raise _BentError(
+            f"its place in the quilt is {farthest:.3g} pixels off (are the texture coordinates right?)"
+        )
     centre, goal = pixels.mean(axis=0), quilt.mean(axis=0)
     solution, _, rank, _ = np.linalg.lstsq(pixels - centre, quilt - goal, rcond=None)
     linear: FloatArray = solution.T

@@ -64,7 +64,8 @@ def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
         mine = (owner == facet) | (owner == -facet)
         for name, value in zip("RGB", stage.scene.background, strict=True):
             pixels = block_window(buffers[name], stage.blocks, block)
-            np.copyto(pixels, value, where=mine, casting="same_kind")
+            # The brightest that half floats hold is bright enough for a background.
+            np.copyto(pixels, min(value, np.finfo(pixels.dtype).max), where=mine, casting="same_kind")
 
 
 def empty_before(
