@@ -102,7 +102,7 @@ def test_a_wall_that_needs_another_pixel_gets_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("corner", "words"),
     [
-        ("1e300", "facet 1 reaches 1e+300 m from the world's origin"),
+        ("1e20", "facet 1 reaches 1e+20 m from the world's origin"),
         ("1e-300", "facet 1 is 1e-300 m large (expected 1e-09 or more)"),
     ],
 )

@@ -206,7 +206,8 @@ BAD = {
     "lines.ply": (PLY_3.format("ascii").encode() + b"0 0 0\n", "{}: the file ends after 1 of 3 rows of vertex"),
     "row.ply": (PLY_3.format("ascii").encode() + b"0 0\n", "{}:10: row 1 of vertex has 2 numbers (expected more)"),
     "text.ply": (PLY_3.format("ascii").encode() + b"0 0 z\n", "{}:10: row 1 of vertex is '0 0 z' (expected numbers)"),
-    "mesh.fbx": (b"", "{}: unknown mesh format '.fbx' (expected .obj, .off, .ply, .stl, .glb, .gltf)"),
+    "mesh.fbx": (b"", "{}: is a .fbx file, which is not read (export as GLB)"),
+    "mesh.xyz": (b"", "{}: unknown mesh format '.xyz' (expected .obj, .off, .ply, .stl, .glb, .gltf)"),
 }  # fmt: skip
 
 

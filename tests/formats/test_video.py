@@ -70,7 +70,7 @@ def test_without_pyav_it_says_what_to_install(monkeypatch):
         return real(name, *given, **more)
 
     monkeypatch.setattr(builtins, "__import__", missing)
-    with pytest.raises(MissingExtraError, match=r"a film needs PyAV, .* \(pip install quiltcli\[video\]\)"):
+    with pytest.raises(MissingExtraError, match=r"a film needs PyAV, .*: pip install -e '\.\[video\]'\)"):
         coding_of(Path("a.mp4"))
 
 

@@ -44,7 +44,8 @@ def test_what_is_missing_is_named(tiny: Path, monkeypatch: pytest.MonkeyPatch) -
     result = CliRunner().invoke(main, ["render", "job.yaml", "--scheduler", "tcp://farm:8786"])
     assert result.exit_code == 2
     assert result.stderr == (
-        "error: --scheduler needs dask.distributed, which is not installed (pip install quiltcli[dist])\n"
+        "error: --scheduler needs dask.distributed, which is not installed "
+        "(in the folder of quilt's sources: pip install -e '.[dist]')\n"
     )
     assert not Path("out").exists()
 
