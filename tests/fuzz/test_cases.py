@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import shlex
 from collections.abc import Iterator
@@ -53,6 +54,7 @@ def test_what_was_found_once(case: Case, seeds: Path, tmp_path: Path) -> None:
     kind = next(kind for kind in KINDS if kind.name == case.kind)
     prepare(seeds, tmp_path / "work", kind)
     path = tmp_path / "work" / kind.file
+    os.mkfifo(tmp_path / "work" / "pipe")
     data = path.read_bytes()
     assert case.old.encode() in data
     path.write_bytes(data.replace(case.old.encode(), case.new.encode(), 1))

@@ -18,7 +18,7 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from quiltcli.errors import MeshError, Problem
 from quiltcli.formats.gltf.json_values import Json, parse_json
-from quiltcli.formats.noted import note_input
+from quiltcli.formats.inputs import read_input
 
 _MAGIC = b"glTF"
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
@@ -160,7 +160,7 @@ def read_container(path: Path) -> Container:
 
 def _opened(path: Path) -> Container:
     """The parts of a file of any version."""
-    data = _file_bytes(path)
+    data = read_input(path, MeshError, "a mesh")
     binary = path.suffix.lower() == ".glb"
     if data[:4] == _MAGIC and not binary:
         raise _error(path, "is binary glTF (name it .glb)")
@@ -172,19 +172,6 @@ def _opened(path: Path) -> Container:
     text, chunk = _chunks(path, data) if binary else (data, None)
     json, repeated = parse_json(text, str(path))
     return Container(path, json, chunk, repeated)
-
-
-def _file_bytes(path: Path) -> bytes:
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise _error(path, "is not a file (expected glTF)")
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise _error(path, "no such file (expected a mesh)") from None
-    except OSError as error:
-        raise _error(path, f"cannot be read: {error.strerror}") from None
-    note_input(path, data)
-    return data
 
 
 def _error(path: Path, message: str) -> MeshError:

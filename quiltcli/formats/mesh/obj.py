@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from quiltcli.errors import Problem
+from quiltcli.errors import MeshError, Problem
+from quiltcli.formats.inputs import read_input
 from quiltcli.formats.mesh.colors import linear_from_srgb
 from quiltcli.formats.mesh.mesh import PolygonMesh, one_face_groups, raise_problems
 from quiltcli.formats.mesh.mtl import MeshMaterial, material_named, read_mtl, without_comment
@@ -29,7 +30,6 @@ from quiltcli.formats.mesh.words import (
     ragged,
     statements,
 )
-from quiltcli.formats.noted import note_input
 from quiltcli.geometry import Float32Array, FloatArray, IntArray, segments
 
 _CORNER = re.compile(r"[-+]?\d+(/([-+]?\d+)?){0,2}", re.ASCII)
@@ -325,12 +325,9 @@ def _materials(
         for name in _libraries(_rest(file, row), path.parent):
             try:
                 place = path.parent / name.replace("\\", "/")
-                data = place.read_bytes()
-                found.update(read_mtl(data, place.parent))
-            except (OSError, ValueError):  # the latter for a zero byte in the name
+                found.update(read_mtl(read_input(place, MeshError), place.parent))
+            except (MeshError, ValueError):
                 missing.append(name)
-            else:
-                note_input(place, data)
     number: dict[str, int] = {}
     rows = [number.setdefault(_rest(file, row), len(number)) for row in used.tolist()]
     materials = tuple(
