@@ -14,7 +14,7 @@ from quiltcli.cli.options import PATH
 @click.argument("files", nargs=-1, required=True, type=PATH)
 def check(files: tuple[Path, ...]) -> None:
     """Read FILES strictly and report every problem found; what is only worth a second look goes to stderr."""
-    from quiltcli.analysis.check import check as check_files
+    from quiltcli.analysis.check import check_files
 
     notices: list[str] = []
     problems = check_files(files, notices.append)
