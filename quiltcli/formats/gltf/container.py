@@ -19,6 +19,7 @@ from urllib.parse import unquote, unquote_to_bytes
 from quiltcli.errors import MeshError, Problem
 from quiltcli.formats.gltf.json_values import Json, parse_json
 from quiltcli.formats.inputs import read_input
+from quiltcli.formats.noted import note_input
 
 _MAGIC = b"glTF"
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
