@@ -50,7 +50,9 @@ class Dialect:
         return [cell.strip().strip('"').strip() for cell in line.split(self.separator)]
 
     def place(self, line: str, index: int) -> int:
-        """1-based column at which a cell begins."""
+        """1-based column at which a cell begins; one behind the line's end where it has not as many."""
+        if index >= len(line.split(self.separator or None)):
+            return len(line.rstrip()) + 1
         if self.separator:
             start = sum(len(cell) + 1 for cell in line.split(self.separator)[:index])
             cell = line.split(self.separator)[index]

@@ -16,6 +16,9 @@ Y_UP = np.eye(3)
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
+_ANYWHERE = 1e12
+
+
 @dataclass(frozen=True)
 class Recording:
     """N samples as the file has them.
@@ -104,7 +107,7 @@ def settle(recording: Recording, spec: RecordedSpec) -> Take:
         assert rate is not None
         count = recording.frames
         times = np.arange(len(recording.positions)) / rate if count is None else (count - 1) / rate
-    positions = recording.positions @ axes.T * metres
+    positions = _sane(recording.positions) @ axes.T * metres
     rotations = _turned(recording, axes)
     lost = np.logical_not(np.isfinite(positions).all(axis=1))
     if rotations is not None:
@@ -143,11 +146,18 @@ def _unsettled(
     return problems
 
 
+def _sane(values: FloatArray) -> FloatArray:
+    """Values (N, C), those of a sample not numbers where one of them is none that anything has."""
+    with np.errstate(invalid="ignore"):
+        good = (np.abs(values) < _ANYWHERE).all(axis=1, keepdims=True)
+    return np.where(good, values, np.nan)
+
+
 def _turned(recording: Recording, axes: FloatArray) -> FloatArray | None:
     """Rotations with Y up: a camera's own axes stay, those of a body change with the file's."""
     if recording.rotations is None:
         return None
-    q = quaternions.unit(recording.rotations)
+    q = quaternions.unit(_sane(recording.rotations))
     # A change of axes C makes C·R·Cᵀ of a rotation: its axis is turned along, and reversed where C mirrors.
     hand = float(np.sign(np.linalg.det(axes)))
     turned = np.concatenate((hand * (q[:, :3] @ axes.T), q[:, 3:]), axis=1)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import contextlib
+import random
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +183,46 @@ def test_what_is_wrong_in_a_file_is_told_where(text: str, words: str, tmp_path: 
 def test_other_columns_are_left_out_with_a_word(tmp_path: Path) -> None:
     path = write_take(tmp_path, "take.csv", "time,x,y,z,confidence\n0,1,2,3,0.5\n")
     assert take_of(path, units="m", up_axis="y").notices == ("columns left out: confidence",)
+
+
+_BITS = (
+    b",",
+    b"\n",
+    b";",
+    b"nan",
+    b"1e400",
+    b"-",
+    b'"',
+    b"\0",
+    b"\xff",
+    b"\n\n",
+    b"99999999999999",
+    b"[",
+    b"null",
+)
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_a_damaged_take_is_read_or_refused(name: str, tmp_path: Path) -> None:
+    file, content, stated = KNOWN[name]
+    whole = content()
+    dice = random.Random(name)
+    for k in range(25):
+        data = bytearray(whole if isinstance(whole, bytes) else whole.encode())
+        for _ in range(dice.choice((1, 1, 3, 10))):
+            at = dice.randrange(len(data) + 1)
+            kind = dice.randrange(4)
+            if kind == 0:
+                data[at : at + 1] = bytes([dice.randrange(256)])
+            elif kind == 1:
+                del data[at : at + dice.randrange(1, 60)]
+            elif kind == 2:
+                data[at:at] = dice.choice(_BITS)
+            else:
+                del data[at:]
+        (tmp_path / str(k)).mkdir()
+        with contextlib.suppress(QuiltError):
+            take_of(write_take(tmp_path / str(k), file, bytes(data)), **stated)
 
 
 def test_xml_with_entities_is_refused(tmp_path: Path) -> None:

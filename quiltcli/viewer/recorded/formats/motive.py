@@ -112,9 +112,10 @@ def _assets(above: list[list[str]], axes: list[str]) -> list[_Asset]:
         position = tuple(parts[("position", axis)] for axis in "xyz" if ("position", axis) in parts)
         turn = [axis for role, axis in parts if role == "rotation"]
         order = "xyzw" if "w" in turn else "".join(turn)
-        rotation = tuple(parts[("rotation", axis)] for axis in order)
+        whole = sorted(turn) in (["w", "x", "y", "z"], ["x", "y", "z"])
+        rotation = tuple(parts[("rotation", axis)] for axis in order) if whole else ()
         if len(position) == 3:
-            assets.append(_Asset(kind, name, position, rotation if len(rotation) >= 3 else (), order))
+            assets.append(_Asset(kind, name, position, rotation, order))
     return assets
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -100,7 +101,7 @@ def _subjects(lines: Sequence[str], at: int, dialect: Dialect) -> list[_Subject]
     last = next(ends, len(lines))
     starts = [k for k in range(2, len(axes)) if names[k]]
     found = []
-    for start, stop in zip(starts, [*starts[1:], len(axes)], strict=True):
+    for start, stop in pairwise([*starts, len(axes)]):
         columns = {axes[k].upper(): k for k in reversed(range(start, stop)) if axes[k]}
         place = columns.get("TX", columns.get("X"))
         if place is None:
