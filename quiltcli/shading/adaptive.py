@@ -20,7 +20,7 @@ from quiltcli.shading.lights import Middle, asks_for_places, turns
 from quiltcli.shading.materials import albedo_at, vertex_colors
 from quiltcli.shading.nodes import NodeColors, nodes_of, points_at_nodes
 from quiltcli.shading.shade import Light, Shades, filled, shade, shade_apart
-from quiltcli.visibility.draw import Hits, Region, WholeTiles
+from quiltcli.visibility.draw import Hits, MixedTiles, Region, WholeTiles
 from quiltcli.visibility.resolve.vectors import sum_of_products
 
 _FAR = 24.0
@@ -111,18 +111,20 @@ def shaded(regions: Iterable[Region], scene: Scene, eye: FloatArray) -> Iterator
     A square in which it is not is looked at by microtiles, a microtile pixel by pixel.
     """
     for region in regions:
-        rest = region
-        if isinstance(region, WholeTiles):
-            smooth = is_smooth(region, scene, eye)
-            some, rest = region.of(smooth), region.of(~smooth)
-            nodes = NodeLight(scene, eye, some)
-            for part in some.parts():
-                yield Shaded(scene, eye, some[part].read(), nodes, part)
-        if rest.side > 1:
-            yield from shaded(rest.split(), scene, eye)
+        if isinstance(region, MixedTiles):
+            yield from (Shaded(scene, eye, hits) for hits in region.hits())
             continue
-        for hits in rest.hits():
-            yield Shaded(scene, eye, hits)
+        # Light at nine nodes a square where these tell enough of it.
+        smooth = is_smooth(region, scene, eye)
+        some = region.of(smooth)
+        nodes = NodeLight(scene, eye, some)
+        for part in some.parts():
+            yield Shaded(scene, eye, some[part].read(), nodes, part)
+        # What is left: smaller squares, or if there are none, pixels.
+        if region.side > 1:
+            yield from shaded(region.split(~smooth), scene, eye)
+        else:
+            yield from (Shaded(scene, eye, hits) for hits in region.of(~smooth).hits())
 
 
 def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:

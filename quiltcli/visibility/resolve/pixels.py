@@ -37,15 +37,6 @@ class MixedTiles:
     tiles: Tiles
     complete: bool
 
-    @property
-    def side(self) -> int:
-        """Microtiles from side to side of the smallest part that is one of a kind."""
-        return 1
-
-    def split(self) -> Iterator[MixedTiles]:
-        """Smaller regions: there are none."""
-        yield from ()
-
     def hits(self) -> Iterator[Hits]:
         """What their pixels see, each a group of its own."""
         keys = self.reader.canvas.keys.take(self.tiles.index, axis=0)

@@ -82,12 +82,16 @@ class WholeTiles:
         """The chosen (G,) of them."""
         return self if chosen.all() else self[np.flatnonzero(chosen)]
 
-    def split(self) -> Iterator[WholeTiles]:
-        """The microtiles they are made of, as regions; none where they are microtiles themselves."""
+    def split(self, chosen: BoolArray | None = None) -> Iterator[WholeTiles]:
+        """The microtiles that they, or the chosen (G,) of them, are made of, as regions.
+
+        There are none where they are microtiles themselves.
+        """
         if self.side == 1:
             return
-        across = self.reader.canvas.tiles_across.take(self.tiles.block)
-        tiles, pair = self.tiles.split(self.side, across), self.pair.repeat(self.side**2)
+        some = slice(None) if chosen is None else np.flatnonzero(chosen)
+        first, pair = self.tiles[some], self.pair[some].repeat(self.side**2)
+        tiles = first.split(self.side, self.reader.canvas.tiles_across.take(first.block))
         for part in slices(0, pair.size, AT_ONCE):
             yield whole_tiles(self.reader, tiles[part], pair[part], even=self.even, border=False, side=1)
 
