@@ -26,10 +26,9 @@ from quiltcli.errors import JobError, QuiltError, ViewerError, raise_all
 from quiltcli.formats.exr.image import Image, read_exr
 from quiltcli.images.facets import facet_image, page_of
 from quiltcli.images.preview import tone_map, write_png
-from quiltcli.job import JobFile, load_display_file, load_job
+from quiltcli.job import JobFile, load_display_file, load_job, pack_spec
 from quiltcli.job.shipped import shipped
 from quiltcli.layout import Layout, read_layout, write_layout
-from quiltcli.layout.packing import pack as pack_layout
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.methods import draw_view
@@ -82,10 +81,26 @@ def load_facets(display: Path | str) -> Facets:
     return load_display(load_display_file(display))
 
 
+def pack_layout(facets: Facets, method: str = "auto", **wishes: Any) -> Layout:
+    """Find a place in the quilt for every facet of a display.
+
+    Args:
+        facets: the display.
+        method: the packing method.
+        wishes: what else `layout` of a job may say: `size`, `padding` and so on.
+
+    Raises:
+        QuiltError: a wish makes no sense, or the facets do not fit.
+    """
+    from quiltcli.layout.packing import pack
+
+    return pack(facets, pack_spec(method=method, **wishes))
+
+
 def set_up(job: Job) -> Setup:
     """Load what a job names and prepare what all its frames share: `facets`, `layout`, `scene` of the result.
 
-    Packs the facets, if the job names no layout; that may take seconds, once.
+    Packs the facets, if the job names no layout and no earlier render has left one in its output folder.
 
     Args:
         job: a job, or the file of one.
