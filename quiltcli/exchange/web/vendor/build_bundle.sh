@@ -13,3 +13,5 @@ $(cat node_modules/three/LICENSE)
 */"
 npx esbuild entry.js --bundle --minify --format=iife --global-name=THREE --target=es2020 \
 	--charset=utf8 --legal-comments=none --banner:js="$notice" --outfile="$here/three.bundle.js"
+cp node_modules/three/LICENSE "$here/LICENSE.three.txt"
+(cd "$here" && sha256sum three.bundle.js > three.bundle.js.sha256)
