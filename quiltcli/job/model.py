@@ -210,6 +210,8 @@ FARTHEST = 1e9
 LARGEST_WHOLE = 2**31 - 1
 
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST)]
+# Clocks may count from 1970, in milliseconds too.
+Seconds = Annotated[float, Field(allow_inf_nan=False, ge=-1e13, le=1e13)]
 Positive = Annotated[float, Field(allow_inf_nan=False, gt=0, le=1e12), AfterValidator(_not_tiny)]
 NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0, le=FARTHEST)]
 Unit = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]

@@ -20,9 +20,9 @@ from quiltcli.job.model import (
     Model,
     Natural,
     NotNegative,
-    Number,
     OneOf,
     Positive,
+    Seconds,
     ShortFor,
     Vec3,
     complaint,
@@ -153,11 +153,11 @@ class RecordedSpec(Model):
     """Place of the tracker's axes in the world: rigid, or scaled alike in all directions."""
     eye_from_marker: Annotated[MarkerSpec, ShortFor(_marker, _PLACE)] | None = None
     """Place of the eye in the marker's axes, metres; or a mapping with translate and rotate_deg."""
-    time_offset: Number = 0.0
+    time_offset: Seconds = 0.0
     """Seconds added to every stamp."""
     time_scale: Positive = 1.0
     """Seconds of the world in a second of the take's clock, from the take's first stamp on."""
-    start: Number = 0.0
+    start: Seconds = 0.0
     """Second of the take that `start_frame` shows."""
     start_frame: int = 1
     """Frame that shows second `start`."""

@@ -245,5 +245,5 @@ def test_csv_with_decimal_commas(tmp_path: Path) -> None:
 def test_csv_places_beyond_any_display(tmp_path: Path) -> None:
     found = check_viewer(track(tmp_path, "1,0,0,0,0,0,-1\n2,1e30,0,0,0,0,-1\n"), [1, 2])
     assert [problem.message for problem in found] == [
-        "x: expected a number from -1000000000 to 1000000000, got 1e30"
+        "x: expected a number from -1000000000 to 1000000000, got 1e+30"
     ]

@@ -9,6 +9,7 @@ are frame, eye, point looked at, up. Blank lines and lines that start with `#` a
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,7 +20,7 @@ import numpy as np
 from quiltcli.errors import Problem, ViewerError, raise_all
 from quiltcli.formats.noted import round_of_notes
 from quiltcli.geometry import FloatArray, IntArray
-from quiltcli.job.model import suggest
+from quiltcli.job.model import FARTHEST, suggest
 from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.columns import (
     EYE,
@@ -80,7 +81,7 @@ def read_track(path: Path) -> Track:
 def _read(path: Path, changed: int, size: int, notes: int) -> Track:
     lines = take_lines(path)
     dialect = dialect_of(lines)
-    if dialect.separator not in (",", ";"):
+    if dialect.separator not in (",", ";", "\t"):
         dialect = Dialect(",")
     good = (k for k, line in enumerate(lines) if _is_row(line, dialect))
     at = next(good, None)
@@ -94,6 +95,7 @@ def _read(path: Path, changed: int, size: int, notes: int) -> Track:
     rows = read_rows(path, rest, columns, dialect, body + 1, len(names), len(columns))
     wanted = [name for _, name in columns]
     raise_all(ViewerError, list(_frame_problems(rows, rest, body + 1, columns[0][0], dialect, path)))
+    raise_all(ViewerError, _far_problems(rows, columns, path))
     return _track(rows, wanted, path)
 
 
@@ -161,6 +163,15 @@ def _frame_problems(
         else:
             words = f"frame: expected a whole number, got {dialect.cells(text)[index]!r}"
         yield Problem(words, str(path), line, dialect.place(text, index))
+
+
+def _far_problems(rows: Rows, columns: list[tuple[int, str]], path: Path) -> Iterator[Problem]:
+    """Places and directions beyond what the renderer's single precision can square."""
+    found = zip(*np.nonzero(np.abs(rows.values) > FARTHEST), strict=True)
+    for row, column in itertools.islice(found, MOST_PROBLEMS):
+        name, value = columns[column][1], rows.values[row, column]
+        words = f"{name}: expected a number from -{FARTHEST:.0f} to {FARTHEST:.0f}, got {value:g}"
+        yield Problem(words, str(path), int(rows.lines[row]), 1)
 
 
 def _track(rows: Rows, names: list[str], path: Path) -> Track:
