@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
 from quiltcli.display.notices import display_notices
 from quiltcli.errors import Problem, QuiltError
@@ -98,11 +99,12 @@ class _Findings:
             if isinstance(name, str) and is_regular(path.parent / name):
                 self.check(path.parent / name)
 
-    def scene(self, path: Path, spec: SceneFile | Path | None) -> None:
+    def scene(self, path: Path, spec: SceneFile | Path | None) -> Scene | None:
         """Load a scene, and note what it has to say."""
         scene = self.run(load_scene, spec)
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
+        return scene
 
     def facets(self, path: Path) -> Facets | None:
         """The facets of a display file, built once."""
@@ -156,10 +158,11 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.notices += job_warnings(job, facets, placed) if facets is not None else ()
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
-    findings.scene(job.scene, findings.run(load_scene_file, job.scene))
+    scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene))
     if facets is not None and not found:
         viewers = viewers_of(job, job.frames)
         findings.problems += eye_problems(facets, viewers, job)
+        findings.notices += stereo_notices(job, facets, scene)
 
 
 def _job_alone(path: Path) -> JobFile | None:
