@@ -36,7 +36,7 @@ from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
-from quiltcli.scene import load_scene
+from quiltcli.scene import Scene, load_scene
 from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import view_problems, viewers_of
 
