@@ -128,3 +128,9 @@ def test_everybody_sees_their_own_facets_and_nobody_elses(tmp_path):
     assert [one["name"] for one in json.loads(page["quilt:viewers"])] == ["ann", "bob"]
     dark = read_exr(tmp_path / "out" / "facets" / "facet_0006.0001.exr").channels["Z"]
     assert not np.isfinite(dark).any()
+
+
+def test_two_eyes_go_no_farther_than_their_head(tmp_path):
+    from quiltcli.analysis.info import describe
+
+    assert describe(ball_job(tmp_path).source.path).data["path_length_m"] == 0

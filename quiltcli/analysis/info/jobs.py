@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, number, vector
 from quiltcli.display import Facets, lit_facets, load_display
+from quiltcli.geometry import FloatArray
 from quiltcli.job import job_sha256, load_display_file, load_job
 from quiltcli.job.dump import plain
 from quiltcli.job.frames import format_frames
@@ -28,7 +29,7 @@ def job_info(path: Path) -> Info:
     viewers = viewers_of(job, job.frames)
     table = _frame_table(viewers, load_display(load_display_file(job.display)))
     eyes = np.stack([viewer.eye for viewer in viewers])
-    length = float(sum(np.linalg.norm(b - a) for a, b in pairwise(eyes)))
+    length = _longest_way(viewers)
     values = plain(job, str) | {"frames": format_frames(job.frames)}
     data = {
         "path": str(path),
@@ -49,6 +50,16 @@ def job_info(path: Path) -> Info:
     ]
     columns = ("frame", "eye", "look", "lit facets")
     return Info("job", data, lines, columns, [_row(entry) for entry in table])
+
+
+def _longest_way(viewers: Sequence[Viewer]) -> float:
+    """How far a head moves over the frames, metres: of several people's, the farthest."""
+    ways: dict[str, dict[int, FloatArray]] = {}
+    for viewer in viewers:
+        place = viewer.eye if viewer.head is None else viewer.head
+        ways.setdefault(viewer.name, {})[viewer.frame] = place
+    steps = ([np.linalg.norm(b - a) for a, b in pairwise(way.values())] for way in ways.values())
+    return max(float(sum(each)) for each in steps)
 
 
 def _frame_table(viewers: list[Viewer], facets: Facets) -> list[dict[str, Any]]:
