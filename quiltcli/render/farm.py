@@ -142,7 +142,7 @@ def _check_workers(client: Any, watch: Watch, address: str, ready: Prepared) -> 
     """
     own = [ready.out.folder / name for name in ("job.yaml", "layout.yaml")]
     files = {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in own}
-    inputs = Inputs(__version__, tuple((files | dict(ready.inputs)).items()))
+    inputs = Inputs(__version__, tuple((dict(ready.inputs) | files).items()))
     hosts = {worker.rpartition(":")[0]: worker for worker in watch.await_workers(len(ready.views))}
     run = uuid.uuid4().hex[:12]
     how = {"retries": _RETRIES, "pure": False, "allow_other_workers": True}

@@ -50,8 +50,8 @@ def test_an_input_that_changes_after_it_was_read_does_not_count(
     job = load_job(path)
     before, load = job_sha256(job), sequence.set_stage
 
-    def changing(given):  # type: ignore[no-untyped-def]
-        stage = load(given)
+    def changing(*given):  # type: ignore[no-untyped-def]
+        stage = load(*given)
         (tmp_path / "wall.off").write_text(WALL.replace("1 1 0", "1 2 0"))
         return stage
 
@@ -68,8 +68,8 @@ def test_an_input_that_is_read_twice_and_changes_between_is_an_error(
     job = load_job(write_tiny_job(tmp_path, "144, 72"))
     load = sequence.set_stage
 
-    def changing(given):  # type: ignore[no-untyped-def]
-        stage = load(given)
+    def changing(*given):  # type: ignore[no-untyped-def]
+        stage = load(*given)
         (tmp_path / name).write_text((tmp_path / name).read_text() + "# later\n")
         return stage
 
