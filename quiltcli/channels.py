@@ -29,18 +29,20 @@ class Channel:
         layers: names of its EXR channels.
         dtype: their pixel type.
         empty: value of a pixel that sees nothing.
+        averaged: whether it is light, the mean of a pixel's samples; others are the pixel's centre's.
     """
 
     layers: tuple[str, ...]
     dtype: np.dtype[Any]
     empty: float = 0.0
+    averaged: bool = False
 
 
 # A pixel that sees nothing is infinitely far in `zv` as well as in `Z`, so that it cannot be taken for
 # one on the far plane, where zv is 1.
 CHANNELS: Mapping[str, Channel] = MappingProxyType(
     {
-        "rgba": Channel(("R", "G", "B", "A"), _HALF),
+        "rgba": Channel(("R", "G", "B", "A"), _HALF, averaged=True),
         "Z": Channel(("Z",), _FLOAT, np.inf),
         "zv": Channel(("zv",), _FLOAT, np.inf),
         "facet": Channel(("facet",), _UINT),
@@ -48,10 +50,10 @@ CHANNELS: Mapping[str, Channel] = MappingProxyType(
         "triangle": Channel(("triangle",), _UINT),
         "N": Channel(("N.X", "N.Y", "N.Z"), _HALF),
         "P": Channel(("P.X", "P.Y", "P.Z"), _FLOAT),
-        "albedo": Channel(("albedo.R", "albedo.G", "albedo.B"), _HALF),
-        "diffuse": Channel(("diffuse.R", "diffuse.G", "diffuse.B"), _HALF),
-        "specular": Channel(("specular.R", "specular.G", "specular.B"), _HALF),
-        "emission": Channel(("emission.R", "emission.G", "emission.B"), _HALF),
+        "albedo": Channel(("albedo.R", "albedo.G", "albedo.B"), _HALF, averaged=True),
+        "diffuse": Channel(("diffuse.R", "diffuse.G", "diffuse.B"), _HALF, averaged=True),
+        "specular": Channel(("specular.R", "specular.G", "specular.B"), _HALF, averaged=True),
+        "emission": Channel(("emission.R", "emission.G", "emission.B"), _HALF, averaged=True),
     }
 )
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.channels import MOST_HALF
 from quiltcli.geometry import BoolArray
+from quiltcli.render.antialiasing import averaged, draw_samples
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
@@ -45,10 +45,10 @@ def draw_batch(
     block = np.arange(*batch)
     lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers)
     channels = stage.job.output.channels
-    samples = stage.job.render.samples
-    if samples > 1:
-        draw_samples(stage, frame, batch, buffers, samples)
-        channels = tuple(name for name in channels if name != "rgba")
+    light = averaged(channels) if stage.job.render.samples > 1 else ()
+    if light:
+        draw_samples(stage, frame, batch, buffers, light)
+        channels = tuple(name for name in channels if name not in light)
     wanted = wanted_for(channels, stage.scene)
     if frame.order is not None:
         wanted |= Wanted.POSITION
@@ -93,40 +93,3 @@ def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits) -> None:
         stored = dict(zip(("zv", "Z"), order.stored(hits.facet, hits.position), strict=True))
         for name in wanted:
             hits.put(buffers[name], stored[name])
-
-
-def draw_samples(stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, samples: int) -> None:
-    """Average the colour of several samples a pixel; what misses the scene counts as background."""
-    found = []
-    scene, eye = stage.scene, frame.viewer.eye
-    for sample in sample_places(samples):
-        drawing = draw(frame, batch, sample)
-        for shaded in shaded_for(("rgba",), drawing, wanted_for(("rgba",), scene), scene, eye):
-            hits, colors = shaded.hits, shaded.pixels()
-            rgba = np.ones((4, hits.depth.size), dtype=np.float32)
-            for color, mine in zip(colors * (3 // len(colors)), rgba, strict=False):
-                np.minimum(color, MOST_HALF, out=mine.reshape(hits.depth.shape))
-            found.append((hits.pixel, np.stack([hits.drawn(c.reshape(hits.depth.shape)) for c in rgba])))
-        drawing.done()
-    if not found or "rgba" not in stage.job.output.channels:
-        return
-    pixel = np.concatenate([p for p, _ in found])
-    order = np.argsort(pixel, kind="stable")
-    pixel = pixel[order]
-    first = np.flatnonzero(np.diff(pixel, prepend=-1))
-    sums = np.add.reduceat(np.concatenate([v for _, v in found], axis=1)[:, order], first, axis=1)
-    sums[:3] += (samples - sums[3]) * stage.scene.background[:, None]
-    for name, values in zip("RGBA", sums / np.float32(samples), strict=True):
-        buffers[name][pixel[first]] = np.minimum(values, MOST_HALF).astype(np.float16)
-
-
-def sample_places(samples: int) -> list[tuple[float, float]]:
-    """Places of the samples in a pixel, from its centre: Hammersley points, the same in every pixel."""
-    places = []
-    for i in range(samples):
-        reverse, step, rest = 0.0, 0.5, i
-        while rest:
-            reverse += step * (rest & 1)
-            step, rest = step / 2, rest >> 1
-        places.append(((i + 0.5) / samples - 0.5, reverse + 0.5 / samples - 0.5))
-    return places

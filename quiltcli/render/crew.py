@@ -75,8 +75,16 @@ class Threads:
 
 def plan_of(stage: Stage, viewer: Viewer, rays: QuiltRays) -> BinPlan:
     """How a frame of the stage is binned."""
-    culling = stage.job.render.backface_culling
-    return bin_plan(stage.scene, stage.parts, stage.blocks, viewer, rays, culling=culling)
+    how = stage.job.render
+    return bin_plan(
+        stage.scene,
+        stage.parts,
+        stage.blocks,
+        viewer,
+        rays,
+        culling=how.backface_culling,
+        reach=0.5 if how.samples > 1 else 0.0,
+    )
 
 
 def default_threads() -> int:

@@ -116,6 +116,18 @@ SOURCES: dict[str, Source] = {
 }
 
 
+def light_at_points(name: str, shaded: Shaded) -> Shades:
+    """Red, green and blue of a channel that is light, at points: (n, k), (n, 1) or (1, 1), float32."""
+    if name == "rgba":
+        found = shaded.pixels()
+    elif name == "albedo":
+        found = shaded.albedo
+    else:
+        light = getattr(shaded.apart, name)
+        found = tuple(light.pixels()) if isinstance(light, NodeColors) else light
+    return found * (3 // len(found))
+
+
 def wanted_for(names: Iterable[str], scene: Scene) -> Wanted:
     """What the hits have to tell for these channels."""
     return reduce(or_, (SOURCES[name].wanted(scene) for name in names), Wanted.NOTHING)

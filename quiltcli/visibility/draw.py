@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.projection.planar import QuiltRays
 from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
@@ -166,7 +166,7 @@ class Drawing:
 def rasterize(
     frame: Frame,
     batch: tuple[int, int],
-    sample: tuple[float, float] = (0.0, 0.0),
+    sample: FloatArray | None = None,
     wanted: Wanted = Wanted.NOTHING,
     scene: Scene | None = None,
 ) -> Iterator[Hits]:
@@ -176,13 +176,13 @@ def rasterize(
     drawing.done()
 
 
-def draw(frame: Frame, batch: tuple[int, int], sample: tuple[float, float] = (0.0, 0.0)) -> Drawing:
+def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None) -> Drawing:
     """Draw the triangles of one batch.
 
     Args:
         frame: the frame.
         batch: one of `batches(frame)`.
-        sample: where in the pixel to look, in pixels from its centre.
+        sample: (F, 2) where in each facet's pixels to look, in pixels from their centres; None for there.
     """
     # What will be drawn on: the batch's microtiles, their rays, and how keys of depth are made.
     counts = frame.pairs.per_block

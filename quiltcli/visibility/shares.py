@@ -60,6 +60,7 @@ class BinPlan:
         cones: of the lit parts of the display.
         cores: of the same parts.
         culling: whether triangles that face away are left out.
+        reach: pixels by which samples lie beside the centres of their pixels, at most.
     """
 
     scene: Scene
@@ -69,6 +70,7 @@ class BinPlan:
     cones: Cones
     cores: Cores
     culling: bool
+    reach: float
 
 
 @dataclass(frozen=True)
@@ -103,11 +105,18 @@ class Binned:
 
 
 def bin_plan(
-    scene: Scene, parts: Parts, blocks: Blocks, viewer: Viewer, rays: QuiltRays, *, culling: bool
+    scene: Scene,
+    parts: Parts,
+    blocks: Blocks,
+    viewer: Viewer,
+    rays: QuiltRays,
+    *,
+    culling: bool,
+    reach: float = 0.0,
 ) -> BinPlan:
     """The plan of a frame; `parts` are the convex pieces of the facets, in the world."""
     cones = lit_cones(parts, rays.lit, viewer.eye)
-    return BinPlan(scene, blocks, viewer, rays, cones, Cores(cones), culling)
+    return BinPlan(scene, blocks, viewer, rays, cones, Cores(cones), culling, reach)
 
 
 def unseen(scene: Scene) -> Seen:
@@ -154,7 +163,7 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     at_once = block[inside].astype(np.int64) << 32 | drawn[inside]
     # Pairs as numbers that sort by block, then triangle.
     sight = sight_of(scene, seen, culling=plan.culling)
-    keys = np.concatenate((at_once, block_keys(pairs, sight, plan.rays, plan.blocks)))
+    keys = np.concatenate((at_once, block_keys(pairs, sight, plan.rays, plan.blocks, plan.reach)))
     keys.sort()
     return Share(
         keys=keys,

@@ -89,7 +89,7 @@ def test_a_wrong_job_does_not_hide_the_files_it_names(tiny: Path) -> None:
     (tiny / "ball.obj").write_text("v 0 0 0\n")
     replaced(tiny, "walls.obj", LINE, COLLAPSED)
     assert found("job.yaml") == [
-        "job.yaml:5:1: viewer.near: missing key (nearest depth that is drawn, metres from the eye)",
+        "job.yaml:5:1: viewer.near: missing key (nearest depth that is drawn, from the eye, metres)",
         "job.yaml:6:3: viewer.naer: unknown key (did you mean 'near'?)",
         "walls.obj:10: facet 2 (right): corners 2 and 3 are the same point (expected distinct corners)",
         "scene.yaml:3:22: objects[0].mesh: ball.obj: holds no triangles",

@@ -151,8 +151,8 @@ def test_no_command_shows_the_help() -> None:
         ),
         (
             ["render", "a.yaml", "-f", "1:4"],
-            "Invalid value for '-f' / '--frames': ':' means different things to different farms, in '1:4'"
-            " (write the step with x: 1-9x2)",
+            "Invalid value for '-f' / '--frames' / '--frame': ':' means different things to different farms,"
+            " in '1:4' (write the step with x: 1-9x2)",
         ),
         (
             ["render", "a.yaml", "--facets", "0"],

@@ -6,7 +6,7 @@ import numpy as np
 
 from quiltcli.display import Facets
 from quiltcli.job import JobFile
-from quiltcli.layout import align
+from quiltcli.layout import Layout, align
 from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene import Light, Scene
 from tests.helpers.in_memory import icosphere
@@ -39,6 +39,11 @@ def ball_scene(
 
 def stage_of_facets(facets: Facets, scene: Scene, bleed: int = 0) -> Stage:
     """The stage of a scene and a display in rows."""
+    return stage_of_layout(facets, align(pack(facets, "rows"), facets), scene, bleed)
+
+
+def stage_of_layout(facets: Facets, layout: Layout, scene: Scene, bleed: int = 0) -> Stage:
+    """The stage of a scene, a display and its layout."""
     path = {"keyframes": [{"frame": 1, "position": [0, 0, 2], "look_at": [0, 0, 0]}]}
     spec = {
         "display": "d.yaml",
@@ -46,5 +51,4 @@ def stage_of_facets(facets: Facets, scene: Scene, bleed: int = 0) -> Stage:
         "frames": "1",
         "viewer": {"near": 0.1, "far": 9, "path": path},
     }
-    layout = align(pack(facets, "rows"), facets)
     return stage_of(JobFile.model_validate(spec), facets, layout, scene, bleed)

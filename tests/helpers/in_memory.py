@@ -161,7 +161,7 @@ def picture(
     triangle = np.full(owners.size, -1, np.int64)
     depth = np.full(owners.size, np.inf)
     for batch in batches(frame):
-        for hits in rasterize(frame, batch, sample):
+        for hits in rasterize(frame, batch, np.tile(sample, (facets.count, 1))):
             assert (triangle[hits.pixel] == -1).all(), "a pixel came twice"
             hits.put(triangle, hits.triangle[:, None])
             hits.put(depth, hits.depth)

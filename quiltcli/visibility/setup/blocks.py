@@ -323,11 +323,13 @@ def least_keys(canvas: Canvas, among: BoolArray | None = None) -> IntArray:
 
 
 def ray_matrices(
-    eye_from_quilt: FloatArray, blocks: Blocks, block: IntArray, sample: tuple[float, float]
+    eye_from_quilt: FloatArray, blocks: Blocks, block: IntArray, sample: FloatArray | None
 ) -> FloatArray:
-    """Matrices (K, 3, 3) from block pixels, whole numbers at the `sample` of each pixel, to eye rays."""
-    matrix = eye_from_quilt[blocks.facet[block]].copy()
-    x = (blocks.x0[block] + 0.5 + sample[0])[:, None]
-    y = (blocks.y0[block] + 0.5 + sample[1])[:, None]
+    """Matrices (K, 3, 3) from block pixels, whole numbers at each facet's `sample` (F, 2), to eye rays."""
+    facet = blocks.facet[block]
+    matrix = eye_from_quilt[facet].copy()
+    beside = np.zeros((1, 2)) if sample is None else sample[facet]
+    x = (blocks.x0[block] + 0.5 + beside[:, 0])[:, None]
+    y = (blocks.y0[block] + 0.5 + beside[:, 1])[:, None]
     matrix[:, :, 2] += x * matrix[:, :, 0] + y * matrix[:, :, 1]
     return matrix

@@ -142,9 +142,14 @@ def project(corners: FloatArray, matrix: FloatArray, result: FloatArray) -> Floa
 
 
 def pixel_boxes(
-    homogeneous: FloatArray, width: IntArray | FloatArray, height: IntArray | FloatArray
+    homogeneous: FloatArray,
+    width: IntArray | FloatArray,
+    height: IntArray | FloatArray,
+    reach: float = 0.0,
 ) -> Int32Array:
     """Bounding boxes (4, N) first/last column, first/last row of the pixels a triangle may cover.
+
+    Samples lie at most `reach` pixels beside a pixel's centre, to either side.
 
     A triangle that reaches behind the eye may cover all of the block; one wholly behind it, or
     beside the block, has an empty box (last < first).
@@ -157,8 +162,8 @@ def pixel_boxes(
     box = np.empty((4, w.shape[1]), dtype=np.int32)
     for axis, extent in ((0, width), (1, height)):
         first, last = _extremes(homogeneous[:, axis] * scale)
-        np.ceil(np.subtract(first, 1e-6, out=first), out=first)
-        np.floor(np.add(last, 1e-6, out=last), out=last)
+        np.ceil(np.subtract(first, reach + 1e-6, out=first), out=first)
+        np.floor(np.add(last, reach + 1e-6, out=last), out=last)
         if not all_front:
             first = np.where(front, first, 0.0)
             last = np.where(front, last, np.where(greatest > 0, extent - 1.0, -1.0))

@@ -69,22 +69,32 @@ class BlockPairs:
 
 
 def block_matrices(
-    rays: QuiltRays, blocks: Blocks, block: IntArray, sample: tuple[float, float]
+    rays: QuiltRays, blocks: Blocks, block: IntArray, sample: FloatArray | None = None
 ) -> FloatArray:
     """Matrices (K, 3, 3) from points minus eye to homogeneous pixels of blocks.
 
-    Whole numbers are sample positions: `sample` is the place in the pixel, (0, 0) its centre.
+    Whole numbers are sample positions: `sample` (F, 2) is the place in each facet's pixels from their
+    centres, None for the centres themselves.
     """
-    matrix = rays.quilt_from_eye[blocks.facet[block]].copy()
-    x = blocks.x0[block] + (0.5 + sample[0] + LATTICE[0])
-    y = blocks.y0[block] + (0.5 + sample[1] + LATTICE[1])
+    facet = blocks.facet[block]
+    matrix = rays.quilt_from_eye[facet].copy()
+    beside = np.zeros((1, 2)) if sample is None else sample[facet]
+    x = blocks.x0[block] + (0.5 + beside[:, 0] + LATTICE[0])
+    y = blocks.y0[block] + (0.5 + beside[:, 1] + LATTICE[1])
     matrix[:, 0] -= x[:, None] * matrix[:, 2]
     matrix[:, 1] -= y[:, None] * matrix[:, 2]
     return matrix
 
 
-def block_keys(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> IntArray:
+def block_keys(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks, reach: float = 0.0) -> IntArray:
     """Give every pair to the blocks of its facet that the triangle's bounding box touches.
+
+    Args:
+        pairs: triangles and facets.
+        sight: the scene from the eye.
+        rays: rays through the quilt.
+        blocks: the blocks of the layout.
+        reach: pixels by which samples lie beside the centres of their pixels, at most.
 
     Returns:
         (N,) block pairs as numbers block·2³² + triangle, ascending.
@@ -96,7 +106,7 @@ def block_keys(pairs: Pairs, sight: Sight, rays: QuiltRays, blocks: Blocks) -> I
     rest = np.flatnonzero(~single)
     for at in range(0, rest.size, _CHUNK):
         chunk = rest[at : at + _CHUNK]
-        found, owner = _blocks_under(pairs.facet[chunk], pairs.triangle[chunk], sight, rays, blocks)
+        found, owner = _blocks_under(pairs.facet[chunk], pairs.triangle[chunk], sight, rays, blocks, reach)
         block.append(found)
         triangle.append(pairs.triangle[chunk][owner])
     keys: IntArray = np.concatenate(block) << 32 | np.concatenate(triangle)
@@ -126,7 +136,7 @@ def vertex_blocks(vertices: FloatArray, facet: Int32Array, rays: QuiltRays, bloc
         return result
     first = np.where(count > 0, blocks.start[:-1], 0)  # nobody asks about facets without blocks
     last = first + np.maximum(count, 1) - 1
-    matrices = np.ascontiguousarray(block_matrices(rays, blocks, first, (0.0, 0.0)).transpose(1, 2, 0))
+    matrices = np.ascontiguousarray(block_matrices(rays, blocks, first).transpose(1, 2, 0))
     width, height = _extent(blocks, first, last)
     for at in range(0, known.size, _CHUNK):
         some = known[at : at + _CHUNK]
@@ -169,22 +179,19 @@ def triangles_of(keys: IntArray) -> Int32Array:
 
 
 def _blocks_under(
-    facet: Int32Array, triangle: Int32Array, sight: Sight, rays: QuiltRays, blocks: Blocks
+    facet: Int32Array, triangle: Int32Array, sight: Sight, rays: QuiltRays, blocks: Blocks, reach: float
 ) -> tuple[IntArray, IntArray]:
     """Blocks (S,) that the triangles' boxes touch, and whose box each is (S,)."""
     first, last = blocks.start[facet], blocks.start[facet + 1] - 1
-    matrix = block_matrices(rays, blocks, first, (0.0, 0.0))
+    matrix = block_matrices(rays, blocks, first)
     width, height = _extent(blocks, first, last)
     corners = gather_corners(sight.vertices, sight.triangles[triangle])
     homogeneous = project(corners, np.ascontiguousarray(matrix.transpose(1, 2, 0)), np.empty_like(corners))
-    box = pixel_boxes(homogeneous, width, height)
-    box[0::2] -= 1  # samples may lie half a pixel beside the centre
-    box[1::2] += 1
-    limit = np.stack((width - 1, height - 1))
-    x0, y0 = np.maximum(box[0::2], 0) // SIDE
-    x1, y1 = np.minimum(box[1::2], limit) // SIDE
-    counts = np.maximum(x1 - x0 + 1, 0) * np.maximum(y1 - y0 + 1, 0)
-    counts[(box[1] < box[0] + 2) | (box[3] < box[2] + 2)] = 0
+    box = pixel_boxes(homogeneous, width, height, reach)
+    x0, y0 = box[0::2] // SIDE
+    x1, y1 = box[1::2] // SIDE
+    counts = (x1 - x0 + 1) * (y1 - y0 + 1)
+    counts[(box[1] < box[0]) | (box[3] < box[2])] = 0
     owner, rank = segments(np.concatenate(([0], np.cumsum(counts))))
     across = (x1 - x0 + 1)[owner]
     column = x0[owner] + rank % across
