@@ -1,4 +1,4 @@
-"""Facets from a mesh and a display file."""
+"""Facets from a mesh and a display file, or from the panels that the file lists."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from quiltcli.display.check import called, check_polygons
-from quiltcli.display.facets import Facets, Places
+from quiltcli.display.facets import Facets, places_of
 from quiltcli.display.notices import likely_unit
+from quiltcli.display.panels import panel_facets
 from quiltcli.display.rasters import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
 from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
@@ -22,12 +23,14 @@ _SMALLEST = 1e-9  # metres
 
 
 def load_display(spec: DisplayFile) -> Facets:
-    """Read the mesh of a display file and make its facets.
+    """Make the facets of a display file from its mesh, which is read, or from its panels.
 
     Raises:
         MeshError: the mesh cannot be read.
         DisplayError: the mesh or the display file makes no facets; every problem found is in it.
     """
+    if spec.mesh is None:
+        return panel_facets(spec)
     return build_facets(read_mesh(spec.mesh), spec)
 
 
@@ -71,7 +74,7 @@ def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
         mirrored=mirrored,
         uv=mesh.uv,
         path=str(spec.source.path),
-        places=_places(spec),
+        places=places_of({k: choice.place for k, choice in sorted(spec.facets.items())}, spec.source),
     )
 
 
@@ -96,28 +99,13 @@ def _beyond_measure(
         yield Problem(words, mesh.path, int(mesh.lines[facet]))
 
 
-def _places(spec: DisplayFile) -> Places | None:
-    """The places in the quilt that the file gives."""
-    given = {facet: choice.place for facet, choice in sorted(spec.facets.items()) if choice.place is not None}
-    if not given:
-        return None
-    return Places(
-        facet=np.array(list(given), dtype=np.int32),
-        page=np.array([place.page - 1 for place in given.values()], dtype=np.int32),
-        turn=np.array([int(place.rotate) // 90 for place in given.values()], dtype=np.int32),
-        mirror=np.array([place.mirror for place in given.values()], dtype=np.bool_),
-        corner=np.array([place.at for place in given.values()], dtype=np.int32),
-        source=spec.source,
-    )
-
-
 def _in_world(mesh: PolygonMesh, spec: DisplayFile) -> FloatArray:
     """Corners (C, 3) in world metres, every sum in a fixed order."""
     with np.errstate(over="ignore", invalid="ignore"):  # `_beyond_measure` tells of it
         corners = mesh.vertices[mesh.corners] * spec.metres
-        if spec.transform is None:
+        matrix = spec.world_from_local
+        if matrix is None:
             return corners
-        matrix = spec.transform.array
         return np.stack([dot(corners, row[:3]) + row[3] for row in matrix[:3]], axis=1)
 
 
@@ -139,11 +127,13 @@ def _rasters(
     corners: FloatArray, start: IntArray, right: FloatArray, down: FloatArray, spec: DisplayFile
 ) -> Rasters:
     asked = np.zeros((len(right), 2), np.int32)
-    asked[:] = spec.resolution.facet_pixels or 0
+    resolution = spec.resolution
+    assert resolution is not None  # a file with a mesh has one
+    asked[:] = resolution.facet_pixels or 0
     for facet, choice in spec.facets.items():
         if choice.facet_pixels is not None:
             asked[facet - 1] = choice.facet_pixels
-    return rasters(corners, start, right, down, spec.resolution.density or 1.0, asked)
+    return rasters(corners, start, right, down, resolution.density or 1.0, asked)
 
 
 def _unknown_facets(count: int, spec: DisplayFile) -> Iterator[Problem]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from quiltcli.errors import Problem
 from quiltcli.formats.mesh import polygons
 from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, facet_from_world, segments
+from quiltcli.job.display import PlaceOnPage
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class Places:
         mirror: (n,) whether the image is mirrored.
         corner: (n, 2) pixel x, y of the page.
         source: finds lines in the display file.
+        panels: whether the file lists panels, whose places stand with them.
     """
 
     facet: Int32Array
@@ -37,10 +39,31 @@ class Places:
     mirror: BoolArray
     corner: Int32Array
     source: Source
+    panels: bool = False
 
     def problem(self, key: Sequence[str | int], message: str) -> Problem:
         """A problem with the place of a facet: the key begins with `facets` and its id."""
-        return self.source.problem((*key[:2], "place"), message)
+        facet = int(key[1])
+        where = ("panels", facet - 1) if self.panels else ("facets", facet)
+        return self.source.problem((*where, "place"), message)
+
+
+def places_of(
+    given: Mapping[int, PlaceOnPage | None], source: Source, *, panels: bool = False
+) -> Places | None:
+    """The places in the quilt that a display file gives, by facet id in ascending order; None without any."""
+    known = {facet: place for facet, place in given.items() if place is not None}
+    if not known:
+        return None
+    return Places(
+        facet=np.array(list(known), dtype=np.int32),
+        page=np.array([place.page - 1 for place in known.values()], dtype=np.int32),
+        turn=np.array([int(place.rotate) // 90 for place in known.values()], dtype=np.int32),
+        mirror=np.array([place.mirror for place in known.values()], dtype=np.bool_),
+        corner=np.array([place.at for place in known.values()], dtype=np.int32),
+        source=source,
+        panels=panels,
+    )
 
 
 @dataclass(frozen=True)

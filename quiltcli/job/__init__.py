@@ -5,7 +5,7 @@ Load a file and every problem in it comes in one `JobError`; every model and par
 """
 
 from quiltcli.job.digest import file_sha256, job_sha256
-from quiltcli.job.display import UNITS, DisplayFile, FacetSpec, ResolutionSpec, TransformSpec
+from quiltcli.job.display import DisplayFile, FacetSpec, PanelSpec, ResolutionSpec, TransformSpec
 from quiltcli.job.dump import dump_job, dump_yaml
 from quiltcli.job.job import COMPRESSIONS, JobFile, OutputSpec, RenderSpec
 from quiltcli.job.layout import (
@@ -18,6 +18,7 @@ from quiltcli.job.layout import (
     UvLayoutSpec,
     read_aspect,
 )
+from quiltcli.job.lengths import UNITS
 from quiltcli.job.load import (
     check_file,
     file_kind,
@@ -62,6 +63,7 @@ __all__ = [
     "OutputSpec",
     "PackSpec",
     "PageSpec",
+    "PanelSpec",
     "PathSpec",
     "PlaceSpec",
     "PointLight",

@@ -1,8 +1,7 @@
-"""The display file: which mesh, how large, and how many pixels its facets have."""
+"""The display file: which mesh or panels, how large, and how many pixels the facets have."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import Annotated, Any, ClassVar
@@ -12,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, Wit
 
 from quiltcli import geometry
 from quiltcli.job.layout import UvLayoutSpec
+from quiltcli.job.lengths import UNITS, Coordinate, Length, UpAxis, exact_metres, read_length, up_matrix
 from quiltcli.job.model import (
     FARTHEST,
     Complaint,
@@ -19,6 +19,7 @@ from quiltcli.job.model import (
     Direction,
     FileModel,
     Items,
+    Listed,
     MeshPath,
     Model,
     Natural,
@@ -32,8 +33,6 @@ from quiltcli.job.model import (
     exactly_one,
     one_of,
 )
-
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 
 def _units(value: Any) -> Any:
@@ -112,18 +111,6 @@ class TransformSpec(Model):
             yield ("matrix",), "flattens space (its determinant is 0)"
 
 
-_LENGTH = re.compile(r"\s*(\d{1,9}(?:\.\d{1,9})?)(?:\s*/\s*(\d{1,9}))?\s*(mm|cm|m|in|ft)\s*")
-_EXACT = {name: Fraction(str(metres)) for name, metres in UNITS.items()}
-
-
-def read_length(text: str) -> Fraction | None:
-    """Metres of a length such as `6 mm` or `1/6 mm`, exactly; None of any other text."""
-    match = _LENGTH.fullmatch(text)
-    if match is None or (match[2] is not None and not int(match[2])):
-        return None
-    return Fraction(match[1]) / Fraction(match[2] or 1) * _EXACT[match[3]]
-
-
 def _pitch(value: Any) -> Any:
     metres = read_length(value) if isinstance(value, str) else None
     if metres is None:
@@ -192,21 +179,64 @@ class FacetSpec(Model):
     """Fixed place in the quilt; facets without one are packed around it."""
 
 
+class PanelSpec(Model):
+    """A flat rectangle, as a vendor's sheet or a tape measure gives it."""
+
+    name: str = ""
+    """A name for messages and tables."""
+    pixels: Size
+    """Width and height, pixels."""
+    pitch: Length | None = None
+    """Distance from pixel to pixel: a number of `units`, or a text such as 6 mm or 1/6 mm."""
+    size: Annotated[tuple[Length, Length], Items(2, "lengths, width and height")] | None = None
+    """Width and height, instead of `pitch`: numbers of `units`, or texts such as 4.5 m."""
+    at: Annotated[tuple[Coordinate, Coordinate, Coordinate], Items(3, "lengths, x, y and z")]
+    """Middle of the panel: numbers of `units`, or texts such as 2.25 m."""
+    yaw_deg: Number = 0.0
+    """Turn about the vertical, anticlockwise from above; 0 faces +Z, or -Y where z is up."""
+    pitch_deg: Number = 0.0
+    """How far it is tilted up, after `yaw_deg`: 90 is a floor, -90 a ceiling, 0 a wall."""
+    roll_deg: Number = 0.0
+    """Turn in its own plane, after the other two, clockwise as seen from the lit side."""
+    mirror: bool = False
+    """Mirror the image, for rear projection."""
+    enabled: bool = True
+    """Whether the panel is rendered at all."""
+    place: PlaceOnPage | None = None
+    """Fixed place in the quilt; panels without one are packed around it."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """A pitch or a size."""
+        yield from exactly_one(self, "pitch", "size")
+
+    def metres(self, unit: float) -> tuple[Fraction, Fraction]:
+        """Width and height, exactly, where the file's unit is so many metres."""
+        if self.size is not None:
+            return exact_metres(self.size[0], unit), exact_metres(self.size[1], unit)
+        assert self.pitch is not None
+        step = exact_metres(self.pitch, unit)
+        return step * self.pixels[0], step * self.pixels[1]
+
+
 class DisplayFile(FileModel):
-    """A display of planar facets."""
+    """A display of planar facets: the faces of a mesh, or panels."""
 
     kind: ClassVar[str] = "quilt_display"
 
     quilt_display: Annotated[int, Field(ge=1, le=1)] = 1
     """Version of the format."""
-    mesh: MeshPath
+    mesh: MeshPath | None = None
     """Polygon mesh; every face is one facet, in the order of the file."""
+    panels: Annotated[tuple[PanelSpec, ...], Listed, Field(min_length=1)] | None = None
+    """Flat rectangles instead of a mesh; every panel is one facet, in this order."""
     units: Units = "m"
-    """What the mesh is measured in: m, cm, mm, in, ft, or a number of metres."""
+    """What the mesh or the panels are measured in: m, cm, mm, in, ft, or a number of metres."""
+    up_axis: UpAxis = "y"
+    """Axis that is up in the mesh or for the panels; with z up, its -Y faces the world's +Z."""
     viewing_side: Annotated[str, OneOf(("front", "back", "both"))] = "front"
     """Lit side: front, where the winding faces; back, seen from inside; both."""
-    resolution: ResolutionSpec
-    """How many pixels the facets have."""
+    resolution: ResolutionSpec | None = None
+    """How many pixels the facets of a mesh have; panels have pixels of their own."""
     facets: dict[Count, FacetSpec] = Field(default_factory=dict)
     """What is different on single facets, by facet id."""
     transform: TransformSpec | None = None
@@ -219,7 +249,37 @@ class DisplayFile(FileModel):
         """Length of one mesh unit, metres."""
         return UNITS[self.units] if isinstance(self.units, str) else self.units
 
+    @property
+    def world_from_local(self) -> geometry.FloatArray | None:
+        """World from the mesh or the panels, both in metres (4, 4); None where they are the same."""
+        if self.up_axis == "y":
+            return None if self.transform is None else self.transform.array
+        upright = up_matrix(self.up_axis)
+        return upright if self.transform is None else np.asarray(self.transform.array @ upright)
+
     def cross_checks(self) -> Iterator[Complaint]:
-        """A mirrored display would be lit on the wrong side."""
+        """A mesh or panels, each with keys of its own; a mirrored display would be lit on the wrong side."""
+        if self.mesh is None and self.panels is None:
+            yield ("mesh",), "missing key (polygon mesh; or panels: flat rectangles)"
+        elif self.mesh is not None and self.panels is not None:
+            yield ("panels",), "cannot stand beside mesh (expected only one of mesh or panels)"
+        if self.panels is None and self.resolution is None:
+            yield ("resolution",), "missing key (how many pixels the facets have)"
+        if self.panels is not None:
+            yield from self._beside_panels()
         if self.transform is not None and np.linalg.det(self.transform.array[:3, :3]) < 0:
             yield ("transform",), "mirrors the display (its determinant is negative)"
+
+    def _beside_panels(self) -> Iterator[Complaint]:
+        """What only a mesh can have."""
+        if self.resolution is not None:
+            yield ("resolution",), "belongs to a mesh (each of the panels has pixels of its own)"
+        if self.facets:
+            yield ("facets",), "belongs to a mesh (name, place, mirror and enabled are keys of each panel)"
+        if self.layout is not None:
+            yield ("layout",), "takes texture coordinates of a mesh (give the panels a place instead)"
+        if self.viewing_side == "back":
+            yield (
+                ("viewing_side",),
+                "expected front or both beside panels (turn one by yaw_deg: 180), got back",
+            )

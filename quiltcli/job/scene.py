@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
+import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from quiltcli.job.display import TransformSpec
+from quiltcli.geometry import FloatArray
+from quiltcli.job.display import TransformSpec, Units
+from quiltcli.job.lengths import UNITS, UpAxis, up_matrix
 from quiltcli.job.model import (
     Direction,
     FileModel,
@@ -86,6 +89,10 @@ class ObjectSpec(Model):
     """Name for tables; the mesh file's name when absent."""
     mesh: MeshPath
     """OBJ, PLY, OFF, STL or glTF."""
+    units: Units = "m"
+    """What the mesh is measured in: m, cm, mm, in, ft, or a number of metres."""
+    up_axis: UpAxis = "y"
+    """Axis that is up in the mesh; with z up, its -Y faces the world's +Z."""
     transform: TransformSpec | None = None
     """Place of the object in the world."""
     material: MaterialSpec | None = None
@@ -94,6 +101,15 @@ class ObjectSpec(Model):
     """Shade each triangle flat, smooth over the vertices, or (auto) as the mesh file says."""
     animation: AnimationSpec | None = None
     """Play the animation in the mesh file; without this key it rests."""
+
+    @property
+    def world_from_mesh(self) -> FloatArray | None:
+        """World from mesh (4, 4): units, up axis, transform; None where they are the same."""
+        if self.units == "m" and self.up_axis == "y":
+            return None if self.transform is None else self.transform.array
+        unit = UNITS[self.units] if isinstance(self.units, str) else self.units
+        local = up_matrix(self.up_axis) * (unit, unit, unit, 1)
+        return local if self.transform is None else np.asarray(self.transform.array @ local)
 
 
 class DirectionalLight(Model):

@@ -16,8 +16,9 @@ from pydantic import (
 )
 
 from quiltcli.errors import JobError
-from quiltcli.job.display import UNITS, Units
+from quiltcli.job.display import Units
 from quiltcli.job.frames import parse_frames
+from quiltcli.job.lengths import UNITS
 from quiltcli.job.model import (
     FARTHEST,
     Complaint,

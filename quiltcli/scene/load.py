@@ -153,7 +153,7 @@ def _add_object(gathered: _Gathered, item: ObjectSpec, assets: dict[Path, Asset]
     time = None if item.animation is None else item.animation.offset
     override = {} if item.material is None else item.material.model_dump(exclude_none=True)
     parts = asset.parts if playing is None or asset.model is None else gltf_parts(asset.model, time, playing)
-    matrix = None if item.transform is None else item.transform.array
+    matrix = item.world_from_mesh
     if matrix is not None:
         parts = tuple(placed(part, matrix) for part in parts)
     if "color" in override:

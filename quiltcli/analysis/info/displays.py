@@ -29,7 +29,7 @@ def display_info(path: Path) -> Info:
     lit = {"front": "front (walked around)", "back": "back (seen from inside)", "both": "both sides"}
     low, high = data["pitch_mm"]
     lines = [
-        ("mesh", data["mesh"]),
+        ("mesh", data["mesh"]) if spec.panels is None else ("panels", f"{len(spec.panels):,}"),
         ("facets", _facets_text(data)),
         ("lit side", lit[spec.viewing_side]),
         ("area", f"{number(data['area_m2'])} m²"),
@@ -46,7 +46,7 @@ def display_info(path: Path) -> Info:
 def _display_data(spec: DisplayFile, facets: Facets) -> dict[str, Any]:
     return {
         "path": facets.path,
-        "mesh": str(spec.mesh),
+        "mesh": None if spec.mesh is None else str(spec.mesh),
         "facets": facets.count,
         "enabled": int(np.count_nonzero(facets.enabled)),
         "polygons": polygon_counts(facets.corner_start),
