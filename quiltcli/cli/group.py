@@ -19,6 +19,7 @@ COMMANDS = (
     "export",
     "import",
     "info",
+    "new",
     "pack",
     "path",
     "pattern",

@@ -7,13 +7,12 @@ from pathlib import Path
 
 from quiltcli.display import Facets
 from quiltcli.errors import OutputError, Problem
-from quiltcli.formats.drawing.shapes import Drawing, Label, Shape
+from quiltcli.formats.drawing.png import write_png
+from quiltcli.formats.drawing.shapes import Drawing, Shape
 from quiltcli.formats.drawing.svg import svg_document, svg_label, svg_polygon
-from quiltcli.formats.whole import whole_file, write_text
+from quiltcli.formats.whole import write_text
 from quiltcli.layout.layout import Layout
 from quiltcli.layout.picture.drawing import PAPER, draw_layout
-
-_FINER = 2  # drawn this much larger, then reduced: smooth edges
 
 
 def layout_picture(
@@ -37,7 +36,7 @@ def layout_picture(
     if path.suffix.lower() == ".svg":
         write_text(path, svg_text(drawing))
     elif path.suffix.lower() == ".png":
-        _write_png(drawing, path)
+        write_png(drawing, path, PAPER)
     else:
         raise OutputError(Problem("a picture's name must end in .png or .svg", file=str(path)))
 
@@ -49,23 +48,3 @@ def svg_text(drawing: Drawing) -> str:
         for item in drawing.items
     )
     return svg_document(drawing.width, drawing.height, PAPER, items)
-
-
-def _write_png(drawing: Drawing, path: Path) -> None:
-    from PIL import Image, ImageDraw, ImageFont
-
-    image = Image.new("RGB", (drawing.width * _FINER, drawing.height * _FINER), PAPER)
-    pen = ImageDraw.Draw(image)
-    for item in drawing.items:
-        if isinstance(item, Label):
-            font = ImageFont.load_default(item.size * _FINER)
-            anchor = "mm" if item.anchor == "middle" else "lm"
-            pen.text((item.x * _FINER, item.y * _FINER), item.text, item.color, font, anchor)
-            continue
-        points = [(x * _FINER, y * _FINER) for x, y in item.points]
-        pen.polygon(points, fill=item.fill)
-        if item.width:
-            pen.line([*points, points[0]], item.outline, round(item.width * _FINER), joint="curve")
-    small = image.resize((drawing.width, drawing.height), Image.Resampling.BOX)
-    with whole_file(path) as temporary:
-        small.save(temporary, format="PNG")

@@ -1,0 +1,344 @@
+"""The kinds of display that `quilt new` knows: what each needs to be told, and the panels it makes of that.
+
+Rectangles stand as panels; the sphere's pieces are trapezoids, and it is a mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from quiltcli.errors import JobError
+from quiltcli.exchange.newjob.figures import Grain, Raster, Sided, read_grain, read_metres, read_sides
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What was asked for, as it was typed; None where nothing was said."""
+
+    kind: str
+    size: str | None = None
+    left: str | None = None
+    right: str | None = None
+    angle: float | None = None
+    radius: str | None = None
+    columns: int | None = None
+    rows: int | None = None
+    steps: int | None = None
+    pitch: str | None = None
+    pixels: str | None = None
+    cabinet: str | None = None
+    base: str | None = None
+    inside: bool = False
+    ceiling: bool = False
+    treads: bool = True
+    eye: Point | None = None
+    canvas: tuple[int, int] | None = None
+    places: tuple[str, ...] = ()
+    padding: int = 0
+    scene: str | None = None
+    frames: str = "1-48"
+    fps: int = 24
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel of the new display: its middle in metres, turned by yaw, then by pitch."""
+
+    name: str
+    raster: Raster
+    at: Point
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A sphere of flat pieces.
+
+    Attributes:
+        vertices: places, metres.
+        faces: vertex indices, 0-based, wound outwards.
+        pixels_per_metre: of every piece.
+    """
+
+    vertices: tuple[Point, ...]
+    faces: tuple[tuple[int, ...], ...]
+    pixels_per_metre: Fraction
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of display.
+
+    Attributes:
+        about: one line.
+        needs: what it cannot do without, by option name, with the question to ask.
+        build: its panels, or its ball.
+        around: whether one walks around it, rather than stands before or inside it.
+        from_above: whether the viewer has to see its upper sides.
+        encloses: whether it is around the viewer; `Wishes.inside` makes it so, too.
+    """
+
+    about: str
+    needs: dict[str, str]
+    build: Callable[[Wishes], tuple[Panel, ...] | Ball]
+    around: bool = False
+    from_above: bool = False
+    encloses: bool = False
+
+
+def _grain(wishes: Wishes) -> Grain:
+    return read_grain(wishes.pitch, wishes.pixels, wishes.cabinet)
+
+
+def _base(wishes: Wishes, default: float = 0.0) -> float:
+    if wishes.base is None:
+        return default
+    return float(read_metres(wishes.base, "--base", negative=True))
+
+
+def _sides(text: str | None, count: int, option: str) -> tuple[Sided, ...]:
+    return read_sides(text or "", count, option)
+
+
+def _count(value: int | None, least: int, most: int, option: str) -> int:
+    if value is None or not least <= value <= most:
+        raise JobError(f"{option}: expected {least} to {most}, got {value}")
+    return value
+
+
+def _wall(wishes: Wishes) -> tuple[Panel, ...]:
+    wide, high = _sides(wishes.size, 2, "--size")
+    raster = _grain(wishes).raster("wall", (wide, high))
+    return (Panel("wall", raster, (0.0, _base(wishes) + float(raster.size[1]) / 2, 0.0)),)
+
+
+def _corner(wishes: Wishes) -> tuple[Panel, ...]:
+    """Two walls that meet over the origin; what halves the angle between them points to +Z."""
+    angle = 90.0 if wishes.angle is None else wishes.angle
+    if not 10 <= angle <= 350:
+        raise JobError(f"--angle: expected 10 to 350 degrees between the lit sides, got {angle:g}")
+    grain, half = _grain(wishes), math.radians(angle / 2)
+    panels = []
+    for name, text, side in (("left", wishes.left, -1), ("right", wishes.right, 1)):
+        wide, high = _sides(text, 2, f"--{name}")
+        raster = grain.raster(name, (wide, high))
+        away = float(raster.size[0]) / 2
+        middle = (side * away * math.sin(half), _base(wishes) + float(raster.size[1]) / 2)
+        at = (*middle, away * math.cos(half))
+        panels.append(Panel(name, raster, at, yaw_deg=-side * (90 - angle / 2)))
+    return tuple(panels)
+
+
+def _curve(wishes: Wishes) -> tuple[Panel, ...]:
+    """Flat columns along an arc; the middle of the arc lies over the origin."""
+    count = _count(wishes.columns, 1, 1000, "--columns")
+    wide, high = _sides(wishes.size, 2, "--size")
+    raster = _grain(wishes).raster("column", (Sided(wide.amount / count, wide.in_pixels), high))
+    bend = read_metres(wishes.radius or "", "--radius", negative=True)
+    width, radius = float(raster.size[0]), abs(float(bend))
+    if radius == 0 or math.asin(min(1.0, width / 2 / radius)) * 2 * count > 2 * math.pi * (1 + 1e-9):
+        raise JobError(
+            f"--radius: {count} columns of {width:g} m go more than around a circle of {radius:g} m"
+        )
+    step = 2 * math.asin(width / 2 / radius)
+    reach, y = radius * math.cos(step / 2), _base(wishes) + float(raster.size[1]) / 2
+    panels = []
+    for k in range(count):
+        turn, sense = (k - (count - 1) / 2) * step, -1 if bend > 0 else 1
+        # A hollow wall turns in on the viewer, a bulging one away from them.
+        at = (reach * math.sin(turn), y, -sense * reach * (1 - math.cos(turn)))
+        panels.append(Panel(f"column_{k + 1}", raster, at, yaw_deg=sense * math.degrees(turn)))
+    return tuple(panels)
+
+
+def _cave(wishes: Wishes) -> tuple[Panel, ...]:
+    """Three walls and a floor around the origin, open behind the viewer; a ceiling where it is asked for."""
+    grain, base = _grain(wishes), _base(wishes)
+    wide, high, deep = _sides(wishes.size, 3, "--size")
+    front = grain.raster("front", (wide, high))
+    side, ground = grain.raster("left", (deep, high)), grain.raster("floor", (wide, deep))
+    w, h = map(float, front.size)
+    d = float(side.size[0])
+    y = base + h / 2
+    panels = [
+        Panel("front", front, (0.0, y, -d / 2)),
+        Panel("left", side, (-w / 2, y, 0.0), yaw_deg=90.0),
+        Panel("right", side, (w / 2, y, 0.0), yaw_deg=-90.0),
+        Panel("floor", ground, (0.0, base, 0.0), pitch_deg=90.0),
+    ]
+    if wishes.ceiling:
+        panels.append(Panel("ceiling", ground, (0.0, base + h, 0.0), pitch_deg=-90.0))
+    return tuple(panels)
+
+
+def _cube(wishes: Wishes) -> tuple[Panel, ...]:
+    """Four sides and a top, to walk around."""
+    grain, base = _grain(wishes), _base(wishes)
+    wide, high, deep = _sides(wishes.size, 3, "--size")
+    front, side = grain.raster("front", (wide, high)), grain.raster("right", (deep, high))
+    top = grain.raster("top", (wide, deep))
+    w, h, d = float(front.size[0]), float(front.size[1]), float(side.size[0])
+    y = base + h / 2
+    return (
+        Panel("front", front, (0.0, y, d / 2)),
+        Panel("right", side, (w / 2, y, 0.0), yaw_deg=90.0),
+        Panel("back", front, (0.0, y, -d / 2), yaw_deg=180.0),
+        Panel("left", side, (-w / 2, y, 0.0), yaw_deg=-90.0),
+        Panel("top", top, (0.0, base + h, 0.0), pitch_deg=90.0),
+    )
+
+
+def _cylinder(wishes: Wishes) -> tuple[Panel, ...]:
+    """Flat columns all around the vertical, whose edges lie on a circle."""
+    count = _count(wishes.columns, 3, 1000, "--columns")
+    across, high = _sides(wishes.size, 2, "--size")
+    if across.in_pixels:
+        raise JobError(f"--size: the diameter is a length (expected such as 2x1.5m), got {wishes.size!r}")
+    chord = Fraction(float(across.amount) * math.sin(math.pi / count)).limit_denominator(10**9)
+    raster = _grain(wishes).raster("column", (Sided(chord), high))
+    reach = float(raster.size[0]) / 2 / math.tan(math.pi / count)
+    y = _base(wishes) + float(raster.size[1]) / 2
+    panels = []
+    for k in range(count):
+        turn = 360.0 * k / count
+        at = (reach * math.sin(math.radians(turn)), y, reach * math.cos(math.radians(turn)))
+        panels.append(Panel(f"column_{k + 1}", raster, at, yaw_deg=turn + 180 * wishes.inside))
+    return tuple(panels)
+
+
+def _sphere(wishes: Wishes) -> Ball:
+    """A ball of trapezoids between circles of latitude, with triangles at the poles."""
+    columns, rows = _count(wishes.columns, 3, 500, "--columns"), _count(wishes.rows, 2, 500, "--rows")
+    (across,) = _sides(wishes.size, 1, "--size")
+    if across.in_pixels or wishes.pitch is None or wishes.pixels or wishes.cabinet:
+        raise JobError("a sphere needs a diameter and a pitch (expected such as --size 2m --pitch 3mm)")
+    radius = float(across.amount) / 2
+    middle = _base(wishes) + radius
+    vertices: list[Point] = [(0.0, middle - radius, 0.0)]
+    for i in range(1, rows):
+        low = math.pi * i / rows
+        for k in range(columns):
+            turn = 2 * math.pi * k / columns
+            ring = radius * math.sin(low)
+            vertices.append((ring * math.sin(turn), middle - radius * math.cos(low), ring * math.cos(turn)))
+    vertices.append((0.0, middle + radius, 0.0))
+    faces = [face for i in range(rows) for face in _belt(i, rows, columns)]
+    return Ball(tuple(vertices), tuple(faces), 1 / read_metres(wishes.pitch, "--pitch"))
+
+
+def _belt(row: int, rows: int, columns: int) -> list[tuple[int, ...]]:
+    """Faces between two circles of latitude, from the lower pole up."""
+    faces: list[tuple[int, ...]] = []
+    for k in range(columns):
+        low, high = (1 + (i - 1) * columns for i in (row, row + 1))
+        a, b = k, (k + 1) % columns
+        if row == 0:
+            faces.append((0, high + b, high + a))
+        elif row == rows - 1:
+            faces.append((low + a, low + b, 1 + (rows - 1) * columns))
+        else:
+            faces.append((low + a, low + b, high + b, high + a))
+    return faces
+
+
+def _stairs(wishes: Wishes) -> tuple[Panel, ...]:
+    """Risers and treads that climb away from the viewer; the first riser stands over the origin."""
+    if wishes.pixels:
+        raise JobError("stairs have panels of two sizes (expected --pitch or --cabinet, not --pixels)")
+    grain, base = _grain(wishes), _base(wishes)
+    count = _count(wishes.steps, 1, 500, "--steps")
+    wide, high, deep = _sides(wishes.size, 3, "--size")
+    riser, tread = grain.raster("riser", (wide, high)), grain.raster("tread", (wide, deep))
+    rise, run = float(riser.size[1]), float(tread.size[1])
+    panels = []
+    for k in range(count):
+        panels.append(Panel(f"riser_{k + 1}", riser, (0.0, base + (k + 0.5) * rise, -k * run)))
+        if wishes.treads:
+            at = (0.0, base + (k + 1) * rise, -(k + 0.5) * run)
+            panels.append(Panel(f"tread_{k + 1}", tread, at, pitch_deg=90.0))
+    return tuple(panels)
+
+
+_COLUMNS = "how many flat columns, such as 16"
+KINDS: dict[str, Kind] = {
+    "corner": Kind(
+        "two walls that meet; --angle is between their lit sides: 90 in a room, 270 around a building",
+        {"left": "left wall, width x height, such as 8x4.5m", "right": "right wall, such as 6x4.5m"},
+        _corner,
+    ),
+    "wall": Kind("one flat wall", {"size": "width x height, such as 8x4.5m"}, _wall),
+    "curve": Kind(
+        "a wall of flat columns along an arc; a positive radius bends around the viewer, a negative one away",
+        {
+            "size": "width along the wall x height, such as 8x4m",
+            "columns": _COLUMNS,
+            "radius": "radius of the arc, such as 6m",
+        },
+        _curve,
+    ),
+    "cave": Kind(
+        "three walls and a floor around the viewer, open behind; with --ceiling five sides",
+        {"size": "width x height x depth, such as 3x3x3m"},
+        _cave,
+        encloses=True,
+    ),
+    "cube": Kind(
+        "four sides and a top, to walk around",
+        {"size": "width x height x depth, such as 2x1x2m"},
+        _cube,
+        around=True,
+    ),
+    "cylinder": Kind(
+        "flat columns all around, lit outside; with --inside around the viewer",
+        {"size": "diameter x height, such as 2x1.5m", "columns": _COLUMNS},
+        _cylinder,
+        around=True,
+    ),
+    "sphere": Kind(
+        "a ball of flat pieces, lit outside; with --inside around the viewer",
+        {"size": "diameter, such as 2m", "columns": "pieces around, such as 24", "rows": "rows, such as 12"},
+        _sphere,
+        around=True,
+    ),
+    "stairs": Kind(
+        "risers and treads that climb away from the viewer; with --no-treads risers alone",
+        {
+            "size": "width x height of a riser x depth of a tread, such as 4x0.16x0.3m",
+            "steps": "how many steps",
+        },
+        _stairs,
+        from_above=True,
+    ),
+}
+GRAIN = "pitch such as 6mm, pixels of a panel such as 1920x1080px, or cabinet such as 500x500mm/128x128px"
+
+
+def missing(wishes: Wishes) -> dict[str, str]:
+    """What a kind needs and was not told, by option name, with the question to ask.
+
+    `grain` stands for the pixels, which may be told in three ways.
+
+    Raises:
+        JobError: there is no such kind.
+    """
+    asked = {name: text for name, text in kind_of(wishes).needs.items() if getattr(wishes, name) is None}
+    if wishes.pitch is None and wishes.pixels is None and wishes.cabinet is None:
+        asked["grain"] = "pixel pitch, such as 3mm" if wishes.kind == "sphere" else GRAIN
+    return asked
+
+
+def kind_of(wishes: Wishes) -> Kind:
+    """The kind that was asked for.
+
+    Raises:
+        JobError: there is no such kind.
+    """
+    if wishes.kind not in KINDS:
+        raise JobError(f"expected one of {', '.join(KINDS)}, got {wishes.kind!r}")
+    return KINDS[wishes.kind]
