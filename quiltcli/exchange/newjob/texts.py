@@ -96,7 +96,8 @@ def scene_text(stand: Stand, content: str | None) -> str:
         (x, y, z), (ex, _, ez) = stand.look_at, stand.eye
         # Half as far behind what is looked at as the eye is before it, and to the right.
         off = 2.5 * stand.content / max(math.hypot(x - ex, z - ez), 1e-9)
-        behind = [x + 0.5 * (x - ex) - off * (z - ez), y, z + 0.5 * (z - ez) + off * (x - ex)]
+        aside = (1.5 * x - 0.5 * ex - off * (z - ez), y, 1.5 * z - 0.5 * ez + off * (x - ex))
+        behind = _point([round(c, 3) for c in aside])
         size, near = _number(stand.content), _point(stand.look_at)
         objects = (
             "# Stand-ins of radius 1: put a mesh of your own here, OBJ, PLY, STL or glTF. A GLB from\n"
@@ -104,7 +105,7 @@ def scene_text(stand: Stand, content: str | None) -> str:
             "objects:\n"
             f"- {{name: near, mesh: content.obj, transform: {{scale: {size}, translate: {near}}},"
             " material: {color: [0.8, 0.25, 0.1]}}\n"
-            f"- {{name: far, mesh: content.obj, transform: {{scale: {size}, translate: {_point([round(c, 3) for c in behind])}}},"
+            f"- {{name: far, mesh: content.obj, transform: {{scale: {size}, translate: {behind}}},"
             " material: {color: [0.1, 0.4, 0.7]}}\n"
         )
     else:
