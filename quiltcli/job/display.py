@@ -187,11 +187,11 @@ class PanelSpec(Model):
     pixels: Size
     """Width and height, pixels."""
     pitch: Length | None = None
-    """Distance from pixel to pixel: a number of `units`, or a text such as 6 mm or 1/6 mm."""
+    """Distance from pixel to pixel: a number of `units` (metres), or a text such as 6 mm or 1/6 mm."""
     size: Annotated[tuple[Length, Length], Items(2, "lengths, width and height")] | None = None
-    """Width and height, instead of `pitch`: numbers of `units`, or texts such as 4.5 m."""
+    """Width and height, instead of `pitch`: numbers of `units` (metres), or texts such as 4.5 m."""
     at: Annotated[tuple[Coordinate, Coordinate, Coordinate], Items(3, "lengths, x, y and z")]
-    """Middle of the panel: numbers of `units`, or texts such as 2.25 m."""
+    """Middle of the panel: numbers of `units` (metres), or texts such as 2.25 m."""
     yaw_deg: Number = 0.0
     """Turn about the vertical, anticlockwise from above; 0 faces +Z, or -Y where z is up."""
     pitch_deg: Number = 0.0

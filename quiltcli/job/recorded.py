@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from quiltcli.geometry import FloatArray
-from quiltcli.job.display import UNITS, TransformSpec, Units
+from quiltcli.job.display import TransformSpec, Units
+from quiltcli.job.lengths import UNITS
 from quiltcli.job.model import (
     Complaint,
     Direction,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quiltcli.job import RecordedSpec
-from quiltcli.job.display import UNITS
+from quiltcli.job.lengths import UNITS
 from quiltcli.viewer.recorded.tables import Dialect, read_rows, take_lines
 from quiltcli.viewer.recorded.take import Recording, choose, wrong
 

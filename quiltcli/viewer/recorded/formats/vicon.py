@@ -15,7 +15,7 @@ import numpy as np
 
 from quiltcli.geometry import FloatArray
 from quiltcli.job import RecordedSpec
-from quiltcli.job.display import UNITS
+from quiltcli.job.lengths import UNITS
 from quiltcli.viewer.recorded.columns import angles_to_rotations
 from quiltcli.viewer.recorded.tables import Dialect, dialect_of, number_of, read_rows, take_lines
 from quiltcli.viewer.recorded.take import Z_UP, Recording, choose, wrong
