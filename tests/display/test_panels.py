@@ -12,7 +12,7 @@ from quiltcli.display import Facets, corner_pixels, load_display
 from quiltcli.display.panels import panel_axes
 from quiltcli.errors import DisplayError, JobError
 from quiltcli.job import PackSpec, load_display_file
-from quiltcli.layout.packing import layout_for
+from quiltcli.layout.from_job import layout_for
 
 WALLS = """quilt_display: 1
 panels:
@@ -145,7 +145,7 @@ def test_a_mirrored_panel_starts_at_its_right(tmp_path: Path) -> None:
 
 def test_panels_keep_their_places_on_the_canvas(tmp_path: Path) -> None:
     text = WALLS.replace("-90}", "-90, place: {at: [80, 4], rotate: 90}}")
-    _, layout = layout_for(PackSpec(size=(128, 64)), built(tmp_path, text))
+    layout = layout_for(PackSpec(size=(128, 64)), built(tmp_path, text))
     at = layout.quilt_from_facet[list(layout.facet).index(2)]
     np.testing.assert_array_equal(at, [[0, -1, 120], [1, 0, 4]])
 

@@ -183,3 +183,11 @@ def test_what_is_missing_is_known() -> None:
     assert missing(SMALL["stairs"]) == {}
     with pytest.raises(JobError):
         missing(Wishes("cubicle"))
+
+
+def test_the_panels_of_the_page_are_what_it_says(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "new.md").read_text(encoding="utf-8")
+    (tmp_path / "display.yaml").write_text(page.split("```yaml\n")[1].split("```")[0])
+    facets = load_display(load_display_file(tmp_path / "display.yaml"))
+    np.testing.assert_allclose(facets.polygon(0)[1], facets.polygon(1)[0], atol=1e-12)
+    assert facets.size.tolist() == [[1333, 750], [750, 750]]

@@ -126,8 +126,7 @@ def scene_text(stand: Stand, content: str | None) -> str:
 
 def job_text(wishes: Wishes, stand: Stand, frames: tuple[int, ...]) -> str:
     """The job file."""
-    packed = "" if wishes.kind == "sphere" else "layout: {method: rects}   # every panel is a rectangle\n"
-    layout = "layout: layout.yaml\n" if wishes.canvas else packed
+    layout = "layout: layout.yaml\n" if wishes.canvas else ""
     # Neighbours that touch on the canvas leave no room to bleed into.
     bleed = f"render:\n  bleed: {wishes.padding}\n" if wishes.canvas and wishes.padding < 2 else ""
     return (

@@ -26,7 +26,7 @@ from quiltcli.job.frames import parse_frames
 from quiltcli.job.model import MESHES, attach
 from quiltcli.layout import Layout
 from quiltcli.layout.file import layout_text
-from quiltcli.layout.packing import layout_for
+from quiltcli.layout.from_job import layout_for
 
 _PLACE = re.compile(r"\s*([\w-]+)\s*=\s*(\d+)\s*,\s*(\d+)\s*(?:,\s*(0|90|180|270)\s*)?")
 NAMES = ("display.yaml", "display.obj", "layout.yaml", "scene.yaml", "content.obj", "job.yaml", "plan.png")
@@ -64,7 +64,7 @@ def new_job(wishes: Wishes, folder: Path) -> NewJob:
     if wishes.canvas is not None:
         method = "auto" if "display.obj" in files else "rects"
         pack = PackSpec(size=wishes.canvas, max_pages=1, padding=wishes.padding, method=method)
-        _, layout = layout_for(pack, facets)
+        layout = layout_for(pack, facets)
         files["layout.yaml"] = layout_text(layout, folder)
     files["scene.yaml"] = texts.scene_text(stand, content)
     if content is None:
