@@ -15,7 +15,7 @@ from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
 from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, dot, normalized
-from quiltcli.job.display import DisplayFile, FacetSpec
+from quiltcli.job.display import DisplayFile, FacetSpec, ResolutionSpec
 from quiltcli.job.model import FARTHEST
 
 _MOST_PROBLEMS = 50
@@ -169,7 +169,7 @@ def _impossible_sizes(
         mistaken = (size[facet] > MOST_PIXELS).any() and spec.units == "m" and extent > 10
         hint = f"; is the mesh in another unit? units: {likely_unit(extent)}" if mistaken else ""
         own = spec.facets.get(int(facet) + 1)
-        key = next(name for name in type(spec.resolution).model_fields if getattr(spec.resolution, name))
+        key = next(name for name in ResolutionSpec.model_fields if getattr(spec.resolution, name))
         yield spec.source.problem(
             ("facets", int(facet) + 1, "facet_pixels") if own and own.facet_pixels else ("resolution", key),
             f"makes {called(int(facet), names)} {width} × {height} pixels "
