@@ -63,12 +63,12 @@ class Ball:
     Attributes:
         vertices: places, metres.
         faces: vertex indices, 0-based, wound outwards.
-        pixels_per_metre: of every piece.
+        pitch: metres from pixel to pixel.
     """
 
     vertices: tuple[Point, ...]
     faces: tuple[tuple[int, ...], ...]
-    pixels_per_metre: Fraction
+    pitch: Fraction
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ def _sphere(wishes: Wishes) -> Ball:
             vertices.append((ring * math.sin(turn), middle - radius * math.cos(low), ring * math.cos(turn)))
     vertices.append((0.0, middle + radius, 0.0))
     faces = [face for i in range(rows) for face in _belt(i, rows, columns)]
-    return Ball(tuple(vertices), tuple(faces), 1 / read_metres(wishes.pitch, "--pitch"))
+    return Ball(tuple(vertices), tuple(faces), read_metres(wishes.pitch, "--pitch"))
 
 
 def _belt(row: int, rows: int, columns: int) -> list[tuple[int, ...]]:

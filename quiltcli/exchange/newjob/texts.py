@@ -48,13 +48,12 @@ def _panel_parts(panel: PanelSpec) -> Iterator[str]:
 def ball_text(wishes: Wishes, spec: DisplayFile) -> str:
     """The display file of a ball, whose mesh is `display.obj`."""
     assert spec.resolution is not None
-    assert spec.resolution.pixels_per_metre is not None
     return (
         f"# {wishes.kind}: {kind_of(wishes).about}\n"
         "quilt_display: 1\n"
         "mesh: display.obj             # every face is a piece of the display, wound outwards; metres, Y up\n"
         f"viewing_side: {spec.viewing_side}           # front: lit outside; back: lit inside\n"
-        f"resolution: {{pixels_per_metre: {_number(spec.resolution.pixels_per_metre)}}}\n"
+        f"resolution: {{pitch: {spec.resolution.pitch}}}\n"
     )
 
 

@@ -149,11 +149,10 @@ def _ball(wishes: Wishes, ball: Ball, folder: Path) -> tuple[dict[str, str], Fac
         lines=np.zeros(len(ball.faces), dtype=np.int64),
         path=str(folder / "display.obj"),
     )
-    density = round(float(ball.pixels_per_metre), 12)
     spec = DisplayFile(
         mesh=Path("display.obj"),
         viewing_side="back" if wishes.inside else "front",
-        resolution=ResolutionSpec(pixels_per_metre=density),
+        resolution=ResolutionSpec(pitch=length_text(ball.pitch)),
     )
     attach(spec, Source(folder / "display.yaml"))
     files = {"display.yaml": texts.ball_text(wishes, spec), "display.obj": texts.ball_mesh_text(ball)}
