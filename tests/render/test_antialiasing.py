@@ -104,7 +104,7 @@ def image_of(turn, corner, samples, bleed):
     facets = replace(facets, normal=np.array([[0.0, 0, 1]]))
     points = facets.corners
     lamps = lights(sun=[(-1, -1, -1)], color=[(2, 2, 2)], ambient=(0.1, 0.1, 0.1))
-    ball = ball_scene(3, 0.45 * np.ptp(points[:, 0]), lamps)
+    ball = ball_scene(4, 0.45 * np.ptp(points[:, 0]), lamps)
     ball = replace(ball, vertices=ball.vertices * [1, 1, 0.01] + points.mean(axis=0) - [0, 0, 0.01])
     stage = with_samples(stage_of_layout(facets, layout, ball, bleed), samples, ("rgba", "Z"))
     buffers = new_buffers(stage)
@@ -114,8 +114,12 @@ def image_of(turn, corner, samples, bleed):
 
 @pytest.mark.parametrize("samples", [1, 4, 5])
 @pytest.mark.parametrize("bleed", [0, 2])
-def test_a_facets_image_does_not_depend_on_its_place(samples, bleed):
-    """One facet turned and mirrored every way, in the middle of a page and at its borders."""
+@pytest.mark.parametrize("side", [None, 8])
+def test_a_facets_image_does_not_depend_on_its_place(samples, bleed, side, monkeypatch):
+    """One facet turned and mirrored every way, inside a page and at its borders, in small blocks too."""
+    if side:
+        monkeypatch.setattr("quiltcli.visibility.setup.blocks.SIDE", side)
+        monkeypatch.setattr("quiltcli.visibility.setup.prewarp.SIDE", side)
     expected = image_of(0, (5, 6), samples, bleed)
     assert np.isfinite(expected["Z"]).sum() > 40
     for turn in range(8):
