@@ -109,3 +109,8 @@ def raise_all(kind: type[QuiltError], problems: Iterable[Problem]) -> None:
     found = tuple(problems)
     if found:
         raise kind(found)
+
+
+def counted(count: int, noun: str) -> str:
+    """`1 page`, `2 pages`, in a message."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

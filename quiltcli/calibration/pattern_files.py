@@ -14,7 +14,8 @@ from quiltcli import __version__
 from quiltcli.calibration.pattern import KINDS, draw, piece
 from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.formats.exr.image import write_exr
-from quiltcli.formats.whole import make_folder, whole_file
+from quiltcli.formats.png import save_png
+from quiltcli.formats.whole import make_folder
 from quiltcli.images.facets import Channel, page_of, quilt_buffers
 from quiltcli.layout import Layout, pixel_owners
 
@@ -135,8 +136,4 @@ def page_pattern(
 
 def write_png(path: Path, channels: Mapping[str, Channel]) -> None:
     """Write uint8 channels R, G, B, A (H, W) as a PNG, whole or not at all (OutputError)."""
-    from PIL import Image
-
-    image = Image.fromarray(np.dstack([channels[name] for name in "RGBA"]))
-    with whole_file(path) as temporary:
-        image.save(temporary, format="PNG")
+    save_png(path, np.dstack([channels[name] for name in "RGBA"]))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.formats.exr.image import read_exr
+from quiltcli.formats.png import save_png
 from quiltcli.formats.whole import make_folder, whole_file
 from quiltcli.geometry import Float32Array
 from quiltcli.images.window import whole_frame
@@ -139,12 +140,9 @@ def write_png(path: Path, rgb: NDArray[Any], view: str = "aces", exposure: float
 
 def write_bytes(path: Path, pixels: Bytes) -> None:
     """Write display values (H, W, 3) uint8 as a PNG, whole or not at all (OutputError)."""
-    from PIL import Image
-
     if path.suffix.lower() != ".png":
         raise OutputError(Problem("a picture's name must end in .png", file=str(path)))
-    with whole_file(path) as temporary:
-        Image.fromarray(pixels).save(temporary, format="PNG", optimize=pixels.size < 1 << 23)
+    save_png(path, pixels, optimize=pixels.size < 1 << 23)
 
 
 def write_values(path: Path, pixels: Values, view: str) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quiltcli.errors import MeshError, Problem, SceneError, raise_all
+from quiltcli.errors import MeshError, Problem, SceneError, counted, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.scene.bake import Baked, bake
@@ -77,7 +77,7 @@ class _Gathered:
         self.coverage += asset.coverage
         for count, why in ((baked.infinite, "with NaN or infinite vertices"), (baked.empty, "of no area")):
             if count:
-                self.notices.append(f"{name}: {_counted(count, 'triangle')} {why} dropped")
+                self.notices.append(f"{name}: {counted(count, 'triangle')} {why} dropped")
         self.notices += [f"{name}: {notice}" for notice in asset.notices]
         for missing in asset.missing:
             self.notices.append(f"{name}: the material file {missing!r} is missing (default materials used)")
@@ -86,7 +86,7 @@ class _Gathered:
         """Say what becomes of an object's animations."""
         if model is None or not model.clips:
             return
-        clips = _counted(len(model.clips), "animation")
+        clips = counted(len(model.clips), "animation")
         if playing is None:
             words = f"{clips} of the file not played ('animation' of the object plays them)"
             self.notices.append(f"{name}: {words}")
@@ -94,7 +94,7 @@ class _Gathered:
         self.notices.append(f"{name}: the animation is not played yet: the object stands as at its start")
         lost = contested_channels(model, playing)
         if lost:
-            words = f"animated by two clips at once (the first counts): {_counted(lost, 'channel')}"
+            words = f"animated by two clips at once (the first counts): {counted(lost, 'channel')}"
             self.notices.append(f"{name}: {words}")
 
     def light(self, name: str, lights: Sequence[FileLight], matrix: FloatArray | None) -> None:
@@ -102,20 +102,16 @@ class _Gathered:
         if not lights:
             return
         if not self.wants_lights:
-            words = f"{_counted(len(lights), 'light')} of the file left out ('lights: file' takes them)"
+            words = f"{counted(len(lights), 'light')} of the file left out ('lights: file' takes them)"
             self.notices.append(f"{name}: {words}")
             return
         spots = sum(light.kind == "spot" for light in lights)
         limited = sum(light.limited for light in lights if light.kind != "spot")
         if spots:
-            self.notices.append(f"{name}: {_counted(spots, 'spot light')} of the file left out")
+            self.notices.append(f"{name}: {counted(spots, 'spot light')} of the file left out")
         if limited:
-            self.notices.append(f"{name}: the range of {_counted(limited, 'light')} is not kept to")
+            self.notices.append(f"{name}: the range of {counted(limited, 'light')} is not kept to")
         self.lights += [light if matrix is None else light.placed(matrix) for light in lights]
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _mesh_scene(path: Path) -> Scene:
@@ -242,7 +238,7 @@ def _uv(baked: Sequence[Baked]) -> FloatArray | None:
 def _notices(gathered: _Gathered, lights: Sequence[LightSpec]) -> tuple[str, ...]:
     notices = list(gathered.notices)
     if gathered.textures:
-        textures = _counted(gathered.textures, "texture")
+        textures = counted(gathered.textures, "texture")
         notices.append(f"textures are not drawn yet: {textures} ignored, base colours are shown instead")
     if not _has_lamps(lights, gathered.lights):
         left_out = any("of the file left out" in notice for notice in notices)

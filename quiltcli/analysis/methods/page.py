@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 import json
 from collections.abc import Iterator
 from html import escape
@@ -15,6 +14,7 @@ from quiltcli.analysis.methods.findings import REFERENCE
 from quiltcli.analysis.methods.study import Study
 from quiltcli.analysis.methods.table import COLUMNS, study_json, study_rows, study_words
 from quiltcli.formats.drawing.charts import Curve, bar_chart, line_chart
+from quiltcli.formats.png import png_bytes
 from quiltcli.formats.whole import make_folder, write_text
 from quiltcli.images.preview import Bytes
 
@@ -138,11 +138,7 @@ def _crops(study: Study) -> str:
 
 
 def _image(pixels: Bytes, name: str) -> str:
-    from PIL import Image
-
-    stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, format="PNG", optimize=True)
-    data = base64.b64encode(stream.getvalue()).decode("ascii")
+    data = base64.b64encode(png_bytes(pixels, optimize=True)).decode("ascii")
     return f'<img alt="{name}" src="data:image/png;base64,{data}">'
 
 

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import base64
-import io
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quiltcli.analysis.sweetspot.plan import Bitmap, Item, Lines, Plan, draw_plan
 from quiltcli.analysis.sweetspot.study import SweetSpot
 from quiltcli.errors import OutputError, Problem
+from quiltcli.formats.drawing.paint import FINER, paint_label, paint_shape, paper, reduced
 from quiltcli.formats.drawing.svg import svg_document, svg_label, svg_points, svg_polygon
-from quiltcli.formats.whole import whole_file, write_text
+from quiltcli.formats.png import png_bytes, save_png
+from quiltcli.formats.whole import write_text
 from quiltcli.geometry import FloatArray
 from quiltcli.layout.picture.drawing import PAPER, Label, Shape
 
-_FINER = 2  # drawn this much larger, then reduced: smooth edges
 _HALO = 3  # pixels of paper around letters
 
 
@@ -44,8 +43,7 @@ def write_plan(plan: Plan, path: Path) -> None:
     if path.suffix.lower() == ".svg":
         write_text(path, svg_text(plan))
         return
-    with whole_file(path) as temporary:
-        _image(plan).save(temporary, format="PNG", optimize=True)
+    save_png(path, _painted(plan), optimize=True)
 
 
 def svg_text(plan: Plan) -> str:
@@ -57,7 +55,7 @@ def _svg(item: Item) -> str:
     """One element."""
     if isinstance(item, Bitmap):
         height, width = item.pixels.shape[:2]
-        data = base64.b64encode(_png_bytes(item.pixels)).decode()
+        data = base64.b64encode(png_bytes(item.pixels, optimize=True)).decode()
         place = f'x="{item.x}" y="{item.y}" width="{width}" height="{height}"'
         return f'<image {place} href="data:image/png;base64,{data}"/>'
     if isinstance(item, Label):
@@ -71,51 +69,31 @@ def _svg(item: Item) -> str:
     return f'<path d="{path}" {style} stroke-linejoin="round"{dash}/>'
 
 
-def _png_bytes(pixels: NDArray[np.uint8]) -> bytes:
-    from PIL import Image
-
-    memory = io.BytesIO()
-    Image.fromarray(pixels).save(memory, format="PNG", optimize=True)
-    return memory.getvalue()
-
-
-def _image(plan: Plan) -> Any:
-    """The plan as a PIL image."""
+def _painted(plan: Plan) -> Any:
+    """The plan as a picture of Pillow's."""
     from PIL import Image, ImageDraw
 
-    image = Image.new("RGB", (plan.width * _FINER, plan.height * _FINER), PAPER)
+    image = paper(plan.width, plan.height, PAPER)
     pen = ImageDraw.Draw(image)
     for item in plan.items:
         if isinstance(item, Bitmap):
-            bitmap = np.repeat(np.repeat(item.pixels, _FINER, axis=0), _FINER, axis=1)
-            image.paste(Image.fromarray(bitmap), (item.x * _FINER, item.y * _FINER))
+            bitmap = np.repeat(np.repeat(item.pixels, FINER, axis=0), FINER, axis=1)
+            image.paste(Image.fromarray(bitmap), (item.x * FINER, item.y * FINER))
         elif isinstance(item, Label):
-            _write(pen, item)
+            paint_label(pen, item, _HALO, PAPER)
         elif isinstance(item, Shape):
-            corners = [tuple(point) for point in (item.points * _FINER).tolist()]
-            pen.polygon(corners, fill=item.fill)
-            if item.width:
-                pen.line([*corners, corners[0]], item.outline, round(item.width * _FINER), joint="curve")
+            paint_shape(pen, item)
         else:
             _trace(pen, item)
-    return image.resize((plan.width, plan.height), Image.Resampling.BOX)
-
-
-def _write(pen: Any, item: Label) -> None:
-    from PIL import ImageFont
-
-    font = ImageFont.load_default(item.size * _FINER)
-    place = (item.x * _FINER, item.y * _FINER)
-    anchor = "mm" if item.anchor == "middle" else "lm"
-    pen.text(place, item.text, item.color, font, anchor, stroke_width=_HALO, stroke_fill=PAPER)
+    return reduced(image)
 
 
 def _trace(pen: Any, item: Lines) -> None:
     """Lines with round ends, dashed or not."""
-    width = item.width * _FINER
+    width = item.width * FINER
     for path in item.paths:
         for piece in dashes(path, item.dash) if item.dash else (path,):
-            points = [tuple(point) for point in (piece * _FINER).tolist()]
+            points = [tuple(point) for point in (piece * FINER).tolist()]
             pen.line(points, item.color, max(1, round(width)), joint="curve")
             for x, y in (points[0], points[-1]):
                 pen.ellipse((x - width / 2, y - width / 2, x + width / 2, y + width / 2), fill=item.color)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from quiltcli.analysis.verify.images import Images
 from quiltcli.analysis.verify.tally import Fault
-from quiltcli.formats.whole import whole_file
+from quiltcli.formats.png import save_png
 from quiltcli.images.facets import page_of
 from quiltcli.layout import Layout
 
@@ -52,8 +52,7 @@ def write_picture(path: Path, layout: Layout, images: Images, faults: Sequence[F
                 box = (x - _RADIUS, y - _RADIUS, x + _RADIUS, y + _RADIUS)
                 draw.ellipse(box, outline=MARKS[fault.kind], width=2)
         left += page.shape[1] + _GAP
-    with whole_file(path) as temporary:
-        picture.save(temporary, format="PNG")
+    save_png(path, picture)
 
 
 def _grey(depth: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -9,7 +9,6 @@ mirrors are in the warp, the polygon in the alpha map.
 
 from __future__ import annotations
 
-import io
 import re
 import zipfile
 from collections.abc import Iterator
@@ -26,6 +25,7 @@ from quiltcli.exchange.pixelmaps.naming import facet_label
 from quiltcli.exchange.pixelmaps.placing import placed_rows
 from quiltcli.exchange.pixelmaps.stmap import centres_mapped
 from quiltcli.formats.pfm import pfm_bytes
+from quiltcli.formats.png import png_bytes
 from quiltcli.formats.whole import whole_file
 from quiltcli.geometry import Float32Array
 from quiltcli.images.facets import facet_image
@@ -128,9 +128,5 @@ def _warp(layout: Layout, row: int) -> Float32Array:
 
 def _alpha(layout: Layout, row: int, owners: NDArray[np.integer[Any]]) -> bytes:
     """The alpha map, a PNG of 8 bits: 255 in the polygon."""
-    from PIL import Image
-
     inside = facet_image({"id": owners}, layout, row, owners)["id"] == layout.facet[row]
-    data = io.BytesIO()
-    Image.fromarray(np.where(inside, 255, 0).astype(np.uint8)).save(data, format="PNG")
-    return data.getvalue()
+    return png_bytes(np.where(inside, 255, 0).astype(np.uint8))

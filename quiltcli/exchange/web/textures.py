@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.analysis.simulate.lookup import Shown
+from quiltcli.formats.png import png_bytes
 from quiltcli.geometry import BoolArray, Float32Array
 from quiltcli.images.facets import page_of
 from quiltcli.images.preview import Bytes, block_means, tone_map
@@ -132,13 +133,11 @@ def _grown(light: Float32Array, known: BoolArray) -> Float32Array:
 
 def picture(pixels: Bytes, quality: int = 0) -> Picture:
     """Compress display values (H, W, 3): as JPEG of a quality, as PNG where that is 0."""
-    from PIL import Image
-
-    stream = io.BytesIO()
-    image = Image.fromarray(pixels)
     if quality:
+        from PIL import Image
+
+        stream = io.BytesIO()
         # Colours at full resolution: reduced ones would come in from beside a facet's edge.
-        image.save(stream, format="JPEG", quality=quality, subsampling=0, optimize=True)
+        Image.fromarray(pixels).save(stream, format="JPEG", quality=quality, subsampling=0, optimize=True)
         return Picture(stream.getvalue(), "image/jpeg")
-    image.save(stream, format="PNG", compress_level=9 if pixels.size < 1 << 23 else 6)
-    return Picture(stream.getvalue(), "image/png")
+    return Picture(png_bytes(pixels, compress_level=9 if pixels.size < 1 << 23 else 6), "image/png")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from quiltcli.errors import counted
 from quiltcli.formats.gltf.accessors import Accessors
 from quiltcli.formats.gltf.animation import read_clips
 from quiltcli.formats.gltf.compression import DRACO, MESHOPT
@@ -179,13 +180,13 @@ class _Reader:
     def _notices(self, cameras: int, other_channels: int) -> Iterator[str]:
         """What the file holds and nothing is made of."""
         if self.undrawn:
-            yield f"{_counted(self.undrawn, 'primitive')} of points or lines left out"
+            yield f"{counted(self.undrawn, 'primitive')} of points or lines left out"
         if self.left_over:
-            yield f"{_counted(self.left_over, 'primitive')} with corners left over after the last triangle"
+            yield f"{counted(self.left_over, 'primitive')} with corners left over after the last triangle"
         if cameras:
-            yield f"{_counted(cameras, 'camera')} left out"
+            yield f"{counted(cameras, 'camera')} left out"
         if other_channels:
-            yield f"{_counted(other_channels, 'animation channel')} left out, which move no node"
+            yield f"{counted(other_channels, 'animation channel')} left out, which move no node"
         if self.container.repeated:
             yield f"the key {self.container.repeated[0][:40]!r} stands twice in one object (the last counts)"
         yield from self._alpha_notices()
@@ -223,10 +224,6 @@ def _name(material: Material, index: int) -> str:
 def _listed(names: Sequence[str]) -> str:
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + more
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _read_skin(entry: Json, accessors: Accessors, nodes: int) -> Skin:

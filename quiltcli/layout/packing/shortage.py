@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from quiltcli.errors import counted
 from quiltcli.job.layout import PACKING_METHODS, PackSpec
 from quiltcli.layout.packing.bounds import LARGEST_PAGE
 from quiltcli.layout.packing.methods import METHODS
@@ -27,9 +28,9 @@ def shortage(wanted: PackInput, result: PackResult, wishes: PackSpec, size: tupl
     missing = int(wanted.size[outside].astype(np.int64).prod(axis=1).sum())
     pages = max(page_count(result), wanted.begun)
     said = (
-        f"{_counted(len(wanted.size), 'facet')} take {_counted(pages, 'page')} of {size[0]}×{size[1]} pixels"
-        f" by the method {wishes.method}, but at most {most} may be used; {_counted(missing, 'pixel')} of"
-        f" {_counted(int(outside.sum()), 'facet')} find no place"
+        f"{counted(len(wanted.size), 'facet')} take {counted(pages, 'page')} of {size[0]}×{size[1]} pixels"
+        f" by the method {wishes.method}, but at most {most} may be used; {counted(missing, 'pixel')} of"
+        f" {counted(int(outside.sum()), 'facet')} find no place"
     )
     ways = []
     density = _density(wanted, wishes, size)
@@ -39,10 +40,6 @@ def shortage(wanted: PackInput, result: PackResult, wishes: PackSpec, size: tupl
     if larger is not None:
         ways.append(f"pages of {larger[0]}×{larger[1]} would")
     return "; ".join((said, ", or ".join(ways))) if ways else said
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"1 {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _density(wanted: PackInput, wishes: PackSpec, size: tuple[int, int]) -> int:
