@@ -7,7 +7,7 @@ the surroundings is, would be a row whose `arriving` says so for its samples one
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -98,12 +98,16 @@ class Kind:
 
 def arrivals(scene: Scene, surface: Surface, *, to_eye: bool) -> Iterator[Arrival]:
     """The light of each lamp at surfaces; with its cosine `to_eye` if that is asked for."""
-    for light in scene.lights:
-        arrival = KINDS[type(light)].arriving(light, surface, to_eye)
-        shown = occlusion(light, surface)
-        if shown is not None and arrival.received is not None:
-            arrival = Arrival(arrival.color, arrival.nl, arrival.vl, arrival.received * shown)
-        yield arrival
+    return (_arrival(light, surface, to_eye) for light in scene.lights)
+
+
+def _arrival(light: Light, surface: Surface, to_eye: bool) -> Arrival:
+    """The light of one lamp, less what is hidden of it."""
+    arrival = KINDS[type(light)].arriving(light, surface, to_eye)
+    shown = occlusion(light, surface)
+    if shown is None or arrival.received is None:
+        return arrival
+    return replace(arrival, received=arrival.received * shown)
 
 
 def occlusion(light: Light, surface: Surface) -> Float32Array | None:

@@ -39,6 +39,13 @@ class MixedTiles:
 
     def hits(self) -> Iterator[Hits]:
         """What their pixels see, each a group of its own."""
+        seen = self.read()
+        if seen.triangle.size:
+            yield seen
+
+    def read(self) -> Hits:
+        """What their pixels see, if any of them sees something."""
+        # Nothing of this outlives the call: whoever shades the hits has the cache for itself.
         keys = self.reader.canvas.keys.take(self.tiles.index, axis=0)
         if self.complete:
             pixel, places, inside = np.arange(keys.size), self.tiles.places(), keys.size
@@ -46,8 +53,7 @@ class MixedTiles:
         else:
             pixel, places, inside = owned_pixels(self.reader.blocks, self.tiles, keys != 0)
             keys = keys.reshape(-1).take(pixel)
-        if keys.size:
-            yield pixel_hits(self.reader, self.tiles, keys, pixel, places, inside)
+        return pixel_hits(self.reader, self.tiles, keys, pixel, places, inside)
 
 
 def pixel_hits(
