@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -103,3 +105,25 @@ def test_the_library_never_prints() -> None:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
     ]
     assert printing == []
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "images.diff",
+        "images.preview",
+        "images.unmap",
+        "images.contact",
+        "images.stereo.files",
+        "analysis.info",
+    ],
+)
+def test_what_looks_at_images_loads_nothing_that_draws_them(module: str) -> None:
+    """Nor does saying what a file is, whatever its kind."""
+    kinds = (PACKAGE / "analysis/info").glob("[a-z]*.py")
+    others = "".join(f", quiltcli.analysis.info.{path.stem}" for path in kinds)
+    wanted = f"quiltcli.{module}" + (others if module == "analysis.info" else "")
+    drawing = "('quiltcli.visibility', 'quiltcli.shading')"
+    code = f"import sys, {wanted}; print([name for name in sys.modules if name.startswith({drawing})])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout == "[]\n"
