@@ -13,12 +13,10 @@ import numpy as np
 
 from quiltcli.errors import ViewerError
 from quiltcli.formats.yaml.source import Source
-from quiltcli.geometry import FloatArray, normalized
+from quiltcli.geometry import FloatArray, normalized, quaternions
+from quiltcli.geometry.interpolation import arc, hold, linear, smooth, squad
 from quiltcli.job import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, RecordedSpec
-from quiltcli.viewer.interpolation import hold, linear, smooth
-from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.head import pose_of, read_head
-from quiltcli.viewer.recorded.resample import arc, squad
 from quiltcli.viewer.recorded.rows import Track, read_track
 
 

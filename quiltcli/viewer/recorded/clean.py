@@ -11,9 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from quiltcli.errors import ViewerError
-from quiltcli.geometry import BoolArray, FloatArray, dot
+from quiltcli.geometry import BoolArray, FloatArray, dot, quaternions
 from quiltcli.job import GapsSpec
-from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.take import Take, wrong
 
 SAME_STAMP = 1e-9

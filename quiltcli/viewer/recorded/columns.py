@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, cross, normalized
-from quiltcli.viewer.recorded import quaternions
+from quiltcli.geometry import FloatArray, cross, normalized, quaternions
 
 EYE = ("x", "y", "z")
 LOOK_AT = ("look_at_x", "look_at_y", "look_at_z")

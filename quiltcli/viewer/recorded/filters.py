@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import FloatArray, quaternions
 from quiltcli.job import FilterSpec
-from quiltcli.viewer.recorded import quaternions, smoothing
+from quiltcli.viewer.recorded import smoothing
 from quiltcli.viewer.recorded.clean import Run
 from quiltcli.viewer.recorded.resample import evenly
 

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from quiltcli.errors import ViewerError
-from quiltcli.geometry import rotation_deg
+from quiltcli.geometry import quaternions, rotation_deg
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.take import Take
 
 

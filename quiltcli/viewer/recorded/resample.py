@@ -1,12 +1,11 @@
-"""Poses between samples: places on cubic Hermite curves, rotations on Shoemake's spherical quadrangles."""
+"""Poses of a run between its samples, and runs at even times."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, IntArray
-from quiltcli.viewer.interpolation import linear, smooth
-from quiltcli.viewer.recorded import quaternions
+from quiltcli.geometry import FloatArray, IntArray, quaternions
+from quiltcli.geometry.interpolation import arc, linear, smooth, squad
 from quiltcli.viewer.recorded.clean import Run
 
 # Stamps that differ from an even beat by less than this share of a step are even.
@@ -25,50 +24,6 @@ def pose_at(run: Run, time: float, *, straight: bool = False) -> tuple[FloatArra
     if run.rotations is None:
         return position, None
     return position, (arc if straight else squad)(run.times, run.rotations, time)
-
-
-def _between(times: FloatArray, time: float) -> tuple[int, float]:
-    """Index of the sample before a time, and the share of the step that has passed."""
-    last = len(times) - 1
-    if time <= times[0] or last == 0:
-        return 0, 0.0
-    if time >= times[-1]:
-        return last - 1, 1.0
-    k = int(np.searchsorted(times, time, side="right")) - 1
-    return k, float((time - times[k]) / (times[k + 1] - times[k]))
-
-
-def arc(times: FloatArray, q: FloatArray, time: float) -> FloatArray:
-    """Rotation (4,) on the great arc between the samples (N, 4) around a time; the ends are held."""
-    k, share = _between(times, time)
-    if share in (0.0, 1.0):
-        end: FloatArray = q[k + int(share)]
-        return end
-    return quaternions.slerp(q[k], q[k + 1], share)
-
-
-def squad(times: FloatArray, q: FloatArray, time: float) -> FloatArray:
-    """Rotation (4,) on a smooth curve through the samples (N, 4) at a time; the ends are held.
-
-    K. Shoemake, Quaternion Calculus and Fast Animation, SIGGRAPH course notes 10 (1987).
-    """
-    k, share = _between(times, time)
-    if share in (0.0, 1.0):
-        end: FloatArray = q[k + int(share)]
-        return end
-    outer = quaternions.slerp(q[k], q[k + 1], share)
-    inner = quaternions.slerp(_handle(q, k), _handle(q, k + 1), share)
-    return quaternions.slerp(outer, inner, 2 * share * (1 - share))
-
-
-def _handle(q: FloatArray, k: int) -> FloatArray:
-    """Inner quadrangle point (4,) of a sample; at the ends the sample itself."""
-    if k in (0, len(q) - 1):
-        result: FloatArray = q[k]
-        return result
-    back = quaternions.inverse(q[k])
-    ways = quaternions.logarithm(quaternions.product(back, q[[k - 1, k + 1]]))
-    return quaternions.product(q[k], quaternions.exponential(-ways.sum(axis=0) / 4))
 
 
 def evenly(run: Run, step: float, *, straight: bool = False) -> Run:
@@ -102,6 +57,6 @@ def places_at(run: Run, times: FloatArray, *, straight: bool = False) -> FloatAr
 
 
 def _places(times: FloatArray, at: FloatArray) -> tuple[IntArray, FloatArray]:
-    """As `_between`, for many times (M,)."""
+    """Index (M,) of the sample before each time (M,), and the share of the step that has passed."""
     k = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
     return k, np.clip((at - times[k]) / (times[k + 1] - times[k]), 0, 1)

@@ -19,9 +19,8 @@ import numpy as np
 
 from quiltcli.errors import Problem, ViewerError, raise_all
 from quiltcli.formats.noted import round_of_notes
-from quiltcli.geometry import FloatArray, IntArray
+from quiltcli.geometry import FloatArray, IntArray, quaternions
 from quiltcli.job.model import FARTHEST, suggest
-from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.columns import (
     EYE,
     HEADING,

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import Problem, ViewerError
-from quiltcli.geometry import BoolArray, FloatArray, IntArray
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, quaternions
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded import quaternions
 
 Y_UP = np.eye(3)
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.formats.noted import note_input
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import FloatArray, quaternions
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.tables import check_size
 from quiltcli.viewer.recorded.take import Z_UP, Recording, choose, wrong
 

@@ -14,9 +14,8 @@ from quiltcli.formats.gltf.container import read_container
 from quiltcli.formats.gltf.json_values import Json
 from quiltcli.formats.gltf.model import Channel, Nodes
 from quiltcli.formats.gltf.nodes import placements, read_nodes
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import FloatArray, quaternions
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.take import Y_UP, Recording, choose, wrong
 
 DENSE = 480

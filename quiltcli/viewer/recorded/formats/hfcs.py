@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.formats.yaml.syntax import read_text
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import FloatArray, quaternions
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.tables import check_size
 from quiltcli.viewer.recorded.take import Y_UP, Recording, choose, wrong
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from quiltcli.errors import MissingExtraError
+from quiltcli.geometry import quaternions
 from quiltcli.job import RecordedSpec
-from quiltcli.viewer.recorded import quaternions
 from quiltcli.viewer.recorded.formats.gltf import DENSE, MOST_SAMPLES
 from quiltcli.viewer.recorded.take import Y_UP, Z_UP, Recording, choose, wrong
 
