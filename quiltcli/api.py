@@ -173,12 +173,12 @@ def draw(what: Setup | Job, frames: Iterable[int] | None = None, *, threads: int
     """
     setup = what if isinstance(what, Setup) else set_up(what)
     job = setup.job
-    views = views_of(job, job.frames if frames is None else frames)
+    views = setup.views(job.frames if frames is None else frames)
     everybody = [viewer for view in views for viewer in view.viewers]
     raise_all(ViewerError, eye_problems(setup.facets, everybody, job))
     for view in views:
         buffers = new_buffers(setup)
-        record = draw_view(setup.at(view.frame), view, buffers, threads or default_threads())
+        record = draw_view(setup.at(view.time), view, buffers, threads or default_threads())
         pages = tuple(
             {name: page_of(flat, setup.layout, page) for name, flat in buffers.items()}
             for page in range(len(setup.layout.pages))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from quiltcli.geometry import FloatArray, quaternions
@@ -88,3 +90,15 @@ def _handle(q: FloatArray, k: int) -> FloatArray:
     back = quaternions.inverse(q[k])
     ways = quaternions.logarithm(quaternions.product(back, q[[k - 1, k + 1]]))
     return quaternions.product(q[k], quaternions.exponential(-ways.sum(axis=0) / 4))
+
+
+VALUES: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
+    "linear": linear,
+    "smooth": smooth,
+    "hold": hold,
+}
+TURNINGS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
+    "linear": arc,
+    "smooth": squad,
+    "hold": hold,
+}

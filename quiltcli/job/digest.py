@@ -33,7 +33,7 @@ def job_sha256(job: JobFile) -> str:
     """
     data = plain(job, file_sha256)
     data["display"] = plain(load_display_file(job.display), file_sha256)
-    data["scene"] = plain(load_scene_file(job.scene), file_sha256)
+    data["scene"] = _scene(job.scene)
     if isinstance(job.layout, Path):
         data["layout"] = _layout_sha256(job.layout)
     elif isinstance(job.layout, PackSpec):
@@ -61,6 +61,16 @@ def _layout_sha256(path: Path) -> str:
 def _text_sha256(data: Any) -> str:
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _scene(path: Path) -> dict[str, Any]:
+    """A scene with the hashes of its meshes, of every file of a sequence."""
+    scene = load_scene_file(path)
+    data: dict[str, Any] = plain(scene, file_sha256)
+    for item, entry in zip(scene.objects, data["objects"], strict=True):
+        if item.sequence is not None:
+            entry["mesh"] = [file_sha256(file) for _, file in item.sequence.files()]
+    return data
 
 
 def file_sha256(path: Path) -> str:

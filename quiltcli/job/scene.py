@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from quiltcli.geometry import FloatArray
-from quiltcli.job.display import TransformSpec, Units
+from quiltcli.job.display import Units
 from quiltcli.job.lengths import UNITS, UpAxis, up_matrix
 from quiltcli.job.model import (
+    Complaint,
     Direction,
     FileModel,
     Listed,
-    MeshPath,
     Model,
     NotNegative,
     Number,
@@ -27,6 +29,9 @@ from quiltcli.job.model import (
     either,
     suggest,
 )
+from quiltcli.job.placement import PlacementSpec
+from quiltcli.job.sequence import MeshOrSequence, MeshSequence, is_pattern
+from quiltcli.job.viewer import FrameRange
 
 
 class MaterialSpec(Model):
@@ -87,14 +92,18 @@ class ObjectSpec(Model):
 
     name: str = ""
     """Name for tables; the mesh file's name when absent."""
-    mesh: MeshPath
-    """OBJ, PLY, OFF, STL or glTF."""
+    mesh: Annotated[Path, MeshOrSequence()]
+    """OBJ, PLY, OFF, STL or glTF; with a run of # for a number, such as boat.####.ply, one a frame."""
+    frames: FrameRange | None = None
+    """Numbers of the files of a sequence."""
+    hold: Annotated[str, OneOf(("nearest", "last"))] | None = None
+    """What a sequence shows where it has no file of the frame's number; without this key that is an error."""
     units: Units = "m"
     """What the mesh is measured in: m, cm, mm, in, ft, or a number of metres."""
     up_axis: UpAxis = "y"
     """Axis that is up in the mesh; with z up, its -Y faces the world's +Z."""
-    transform: TransformSpec | None = None
-    """Place of the object in the world."""
+    transform: PlacementSpec | None = None
+    """Place of the object in the world, or places at keyframes."""
     material: MaterialSpec | None = None
     """What to change of the materials in the mesh file."""
     normals: Annotated[str, OneOf(("auto", "flat", "smooth"))] = "auto"
@@ -102,14 +111,41 @@ class ObjectSpec(Model):
     animation: AnimationSpec | None = None
     """Play the animation in the mesh file; without this key it rests."""
 
-    @property
-    def world_from_mesh(self) -> FloatArray | None:
-        """World from mesh (4, 4): units, up axis, transform; None where they are the same."""
+    def world_from_mesh(self, frame: float | None = None) -> FloatArray | None:
+        """World from mesh (4, 4) at a frame or at its start: units, up axis, transform; None where they are one."""
+        place = self.transform
+        world = None if place is None else place.at(place.start if frame is None else frame)
         if self.units == "m" and self.up_axis == "y":
-            return None if self.transform is None else self.transform.array
+            return world
         unit = UNITS[self.units] if isinstance(self.units, str) else self.units
         local = up_matrix(self.up_axis) * (unit, unit, unit, 1)
-        return local if self.transform is None else np.asarray(self.transform.array @ local)
+        return local if world is None else np.asarray(world @ local)
+
+    @property
+    def sequence(self) -> MeshSequence | None:
+        """The files of the object, where it is one a frame."""
+        return None if self.frames is None else MeshSequence(self.mesh, self.frames, self.hold)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it may look otherwise in another frame."""
+        carried = self.transform is not None and self.transform.moves
+        return carried or self.animation is not None or self.frames is not None
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """Numbered files have numbers, and others have none."""
+        if self.frames is None:
+            if is_pattern(self.mesh) and not self.mesh.exists():
+                words = f"is a sequence (expected frames, the numbers of {self.mesh.name}), got no frames"
+                yield ("mesh",), words
+            if self.hold is not None:
+                yield ("hold",), "belongs to a sequence of meshes (expected frames beside it)"
+            return
+        if not is_pattern(self.mesh):
+            words = f"belongs to a sequence (expected a mesh such as boat.####.ply), got {self.mesh.name!r}"
+            yield ("frames",), words
+        if self.animation is not None:
+            yield ("animation",), "cannot stand beside frames (a sequence has one pose a file)"
 
 
 class DirectionalLight(Model):

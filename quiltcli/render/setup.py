@@ -10,13 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.display import Facets, load_display
+from quiltcli.errors import SceneError, raise_all
 from quiltcli.geometry import OwnerArray
 from quiltcli.images.names import layout_path
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
-from quiltcli.scene import Scene, load_scene
+from quiltcli.scene import Scene
+from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
 from quiltcli.viewer.clip import settled_clip
 from quiltcli.viewer.view import View, views_of
@@ -56,7 +58,14 @@ class Stage:
         return settled_clip(self.job, self.facets)
 
     def views(self, frames: Iterable[int]) -> list[View]:
-        """The views of some frames; errors as for `viewer.view.views_of`."""
+        """The views of some frames.
+
+        Raises:
+            ViewerError: as for `viewer.view.views_of`.
+            SceneError: the scene has nothing to show in one of the frames.
+        """
+        frames = list(frames)
+        raise_all(SceneError, self.source.problems(frames) if self.source else ())
         return views_of(self.job, frames, self.clip)
 
     def at(self, frame: float) -> Stage:
@@ -79,7 +88,8 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     facets = load_display(load_display_file(job.display))
     layout = layout_for(job.layout or PackSpec(), facets, kept)
     demand_memory(job, layout)
-    return stage_of(job, facets, layout, load_scene(load_scene_file(job.scene)), job.render.bleed)
+    scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))
+    return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)
 
 
 def stage_of(job: JobFile, facets: Facets, layout: Layout, scene: Scene, bleed: int) -> Stage:

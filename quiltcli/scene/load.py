@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quiltcli.errors import MeshError, Problem, SceneError, counted, raise_all
+from quiltcli.errors import Problem, SceneError, counted, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import Float32Array, FloatArray
-from quiltcli.scene.bake import Baked, bake
+from quiltcli.scene.bake import Baked
 from quiltcli.scene.importers.asset import Asset, read_asset
-from quiltcli.scene.importers.gltf import (
-    FileLight,
-    GltfModel,
-    Playing,
-    contested_channels,
-    gltf_lights,
-    gltf_parts,
-)
-from quiltcli.scene.importers.part import Part, placed
+from quiltcli.scene.importers.gltf import FileLight, GltfModel, Playing, contested_channels
 from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point
 from quiltcli.scene.materials import Surface, material_table
+from quiltcli.scene.objects import Brought, ObjectError, SceneObject, bring, load_object
 from quiltcli.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -38,6 +31,7 @@ def load_scene(scene: Path | str | SceneFile) -> Scene:
 
     Everything is baked to world space: instances, transforms (a mirroring one turns the winding
     over), materials. Colours given in the scene file replace the mesh's own, vertex colours included.
+    What moves is as it is at its start; `motion.load_moving_scene` has all its frames.
 
     Raises:
         SceneError: a mesh is missing, unreadable, of an unknown kind or has no triangles. All
@@ -50,8 +44,9 @@ def load_scene(scene: Path | str | SceneFile) -> Scene:
             return _mesh_scene(path)
         from quiltcli.job import load_scene_file
 
-        return _file_scene(load_scene_file(path))
-    return _file_scene(scene)
+        scene = load_scene_file(path)
+    objects = load_objects(scene)
+    return scene_of(scene, objects, [one.start for one in objects])
 
 
 @dataclass
@@ -67,6 +62,12 @@ class _Gathered:
     notices: list[str] = field(default_factory=list)
     lights: list[FileLight] = field(default_factory=list)
     wants_lights: bool = False
+
+    def take(self, name: str, brought: Brought, playing: Playing | None) -> None:
+        """Append what an object brings."""
+        self.add(name, brought.asset, brought.baked, brought.surfaces)
+        self.animate(name, brought.asset.model, playing)
+        self.light(name, brought.lights)
 
     def add(self, name: str, asset: Asset, baked: Baked, surfaces: Sequence[Surface]) -> None:
         """Append an object; its parts have the given surfaces."""
@@ -91,13 +92,12 @@ class _Gathered:
             words = f"{clips} of the file not played ('animation' of the object plays them)"
             self.notices.append(f"{name}: {words}")
             return
-        self.notices.append(f"{name}: the animation is not played yet: the object stands as at its start")
         lost = contested_channels(model, playing)
         if lost:
             words = f"animated by two clips at once (the first counts): {counted(lost, 'channel')}"
             self.notices.append(f"{name}: {words}")
 
-    def light(self, name: str, lights: Sequence[FileLight], matrix: FloatArray | None) -> None:
+    def light(self, name: str, lights: Sequence[FileLight]) -> None:
         """Take an object's own lights, or say that they are left out."""
         if not lights:
             return
@@ -111,76 +111,49 @@ class _Gathered:
             self.notices.append(f"{name}: {counted(spots, 'spot light')} of the file left out")
         if limited:
             self.notices.append(f"{name}: the range of {counted(limited, 'light')} is not kept to")
-        self.lights += [light if matrix is None else light.placed(matrix) for light in lights]
+        self.lights += lights
 
 
 def _mesh_scene(path: Path) -> Scene:
     """A mesh file as the only object, lit by the headlight."""
+    from quiltcli.job.scene import ObjectSpec
+
     gathered = _Gathered()
-    asset = read_asset(path)
-    gathered.add(path.stem, asset, _baked(asset.parts, "auto", path), [part.surface for part in asset.parts])
-    gathered.animate(path.stem, asset.model, None)
-    gathered.light(path.stem, _lights_of(asset, None), None)
+    gathered.take(path.stem, bring(ObjectSpec(mesh=path), read_asset(path)), None)
     return _assembled(gathered, (), (0.0, 0.0, 0.0))
 
 
-def _file_scene(spec: SceneFile) -> Scene:
-    """Every object of a scene file; all that fail are reported together."""
-    gathered = _Gathered(wants_lights=any(light.type == "file" for light in spec.lights))
+def load_objects(spec: SceneFile) -> tuple[SceneObject, ...]:
+    """The objects of a scene file, each as it is at its start; a mesh that several show is read once.
+
+    Raises:
+        SceneError: as for `load_scene`.
+    """
     assets: dict[Path, Asset] = {}
+    objects: list[SceneObject] = []
     problems: list[Problem] = []
     for index, item in enumerate(spec.objects):
         try:
-            _add_object(gathered, item, assets)
-            gathered.notices += _bright(index, item)
+            objects.append(load_object(item, assets))
         except SceneError as error:
-            key = "animation" if isinstance(error, _AnimationError) else "mesh"
+            key = error.key if isinstance(error, ObjectError) else "mesh"
             problems += [spec.source.problem(("objects", index, key), str(p)) for p in error.problems]
     raise_all(SceneError, problems)
+    return tuple(objects)
+
+
+def scene_of(spec: SceneFile, objects: Sequence[SceneObject], brought: Sequence[Brought]) -> Scene:
+    """The scene of objects that bring this."""
+    gathered = _Gathered(wants_lights=wants_lights(spec))
+    for index, (one, given) in enumerate(zip(objects, brought, strict=True)):
+        gathered.take(one.name, given, one.playing)
+        gathered.notices += _bright(index, spec.objects[index])
     return _assembled(gathered, spec.lights, spec.background)
 
 
-def _add_object(gathered: _Gathered, item: ObjectSpec, assets: dict[Path, Asset]) -> None:
-    """Read, place and bake one object; a mesh that several objects show is read once."""
-    if item.mesh not in assets:
-        assets[item.mesh] = read_asset(item.mesh)
-    asset = assets[item.mesh]
-    playing = _playing(item, asset)
-    time = None if item.animation is None else item.animation.offset
-    override = {} if item.material is None else item.material.model_dump(exclude_none=True)
-    parts = asset.parts if playing is None or asset.model is None else gltf_parts(asset.model, time, playing)
-    matrix = item.world_from_mesh
-    if matrix is not None:
-        parts = tuple(placed(part, matrix) for part in parts)
-    if "color" in override:
-        parts = tuple(replace(part, colors=None) for part in parts)
-    surfaces = [part.surface.overridden(override) for part in parts]
-    name = item.name or item.mesh.stem
-    gathered.add(name, asset, _baked(parts, item.normals, item.mesh), surfaces)
-    gathered.animate(name, asset.model, playing)
-    gathered.light(name, _lights_of(asset, playing, time), matrix)
-
-
-class _AnimationError(SceneError):
-    """An animation that cannot be played."""
-
-
-def _playing(item: ObjectSpec, asset: Asset) -> Playing | None:
-    """How an object's animation is played, if it is."""
-    if item.animation is None:
-        return None
-    if asset.model is None or not asset.model.clips:
-        raise _AnimationError(Problem("has no animation", str(item.mesh)))
-    playing = Playing(item.animation.clip, item.animation.after)
-    try:
-        asset.model.chosen(playing)
-    except MeshError as error:
-        raise _AnimationError(error.problems) from error
-    return playing
-
-
-def _lights_of(asset: Asset, playing: Playing | None, time: float | None = None) -> tuple[FileLight, ...]:
-    return () if asset.model is None else gltf_lights(asset.model, None if playing is None else time, playing)
+def wants_lights(spec: SceneFile) -> bool:
+    """Whether a scene takes the lights of its objects' files."""
+    return any(light.type == "file" for light in spec.lights)
 
 
 def _bright(index: int, item: ObjectSpec) -> Iterator[str]:
@@ -191,13 +164,6 @@ def _bright(index: int, item: ObjectSpec) -> Iterator[str]:
     text = ", ".join(f"{part:g}" for part in material.color)
     how = "divide 8-bit values by 255 and make them linear" if max(material.color) > 2 else "white is 1"
     yield f"objects[{index}].material.color [{text}] reflects more light than falls on it ({how})"
-
-
-def _baked(parts: Sequence[Part], mode: str, path: Path) -> Baked:
-    baked = bake(parts, mode)
-    if not len(baked.triangles):
-        raise SceneError(Problem("every triangle is without area or not finite", str(path)))
-    return baked
 
 
 def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Color) -> Scene:
@@ -217,7 +183,7 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         material=np.concatenate(rows),
         objects=tuple(gathered.names),
         materials=material_table(list(gathered.surfaces)),
-        lights=_lights(lights, gathered.lights),
+        lights=lights_in(lights, gathered.lights),
         background=np.array(background, dtype=np.float32),
         uv=_uv(baked),
         coverage=gathered.coverage,
@@ -252,7 +218,7 @@ def _has_lamps(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> bool:
     return any(light.type != "file" for light in lights) or any(light.kind != "spot" for light in found)
 
 
-def _lights(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> tuple[Light, ...]:
+def lights_in(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> tuple[Light, ...]:
     """The lights of scene and mesh files; without any, a headlight and a dim ambient light."""
     if not _has_lamps(lights, found):
         return default_lights()

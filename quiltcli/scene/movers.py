@@ -33,8 +33,15 @@ class Mover:
         """World vertices (V, 3) and unit normals (V, 3) at a time, in the order of `baked`."""
         vertices, normals = pose(self.model, seconds, self.playing)
         if self.matrix is not None:
-            nothing = np.empty((0, 3), dtype=np.int64)
-            moved = placed(Part(vertices, nothing, normals, None, Surface()), self.matrix)
-            vertices = moved.vertices
-            normals = np.zeros_like(vertices) if moved.normals is None else moved.normals
+            vertices, given = moved(self.matrix, vertices, normals)
+            normals = np.zeros_like(vertices) if given is None else given
         return reposed(self.baked, vertices, normals)
+
+
+def moved(
+    matrix: FloatArray, vertices: FloatArray, normals: FloatArray
+) -> tuple[FloatArray, FloatArray | None]:
+    """Vertices and normals (V, 3) moved by an affine (4, 4) matrix; None for normals that it flattens."""
+    nothing = np.empty((0, 3), dtype=np.int64)
+    part = placed(Part(vertices, nothing, normals, None, Surface()), matrix)
+    return part.vertices, part.normals

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Protocol
 
+from quiltcli.errors import Problem
 from quiltcli.scene.scene import Scene
 
 
@@ -16,3 +18,6 @@ class SceneSource(Protocol):
         Arrays that are as they were in another frame should be the same objects: what is the same is
         neither copied to workers nor worked out again.
         """
+
+    def problems(self, frames: Iterable[int]) -> Iterator[Problem]:
+        """What keeps frames from being drawn."""

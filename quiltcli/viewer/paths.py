@@ -14,7 +14,7 @@ import numpy as np
 from quiltcli.errors import ViewerError
 from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import FloatArray, normalized, quaternions
-from quiltcli.geometry.interpolation import arc, hold, linear, smooth, squad
+from quiltcli.geometry.interpolation import TURNINGS, VALUES, arc, linear
 from quiltcli.job import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, RecordedSpec
 from quiltcli.viewer.recorded.head import pose_of, read_head
 from quiltcli.viewer.recorded.rows import Track, read_track
@@ -48,7 +48,7 @@ def keyframe_pose(path: PathSpec, frame: float, fps: float) -> Pose:
     # Points aimed at are interpolated as points; only directions are as directions.
     values = np.array([[*key.position, *_aim(key), *key.up] for key in keys])
     kind = path.interpolation or "linear"
-    row = INTERPOLATIONS[kind](frames, values, float(frame))
+    row = VALUES[kind](frames, values, float(frame))
     eye, aim, up = row[0:3], row[3:6], row[6:9]
     before = max(int(np.searchsorted(frames, frame, side="right")) - 1, 0)
     blame = ("keyframes", numbered[before][0])
@@ -65,18 +65,6 @@ def _aim(key: KeyframeSpec) -> FloatArray:
     if key.look is not None:
         return normalized(np.asarray(key.look))
     return np.asarray(key.look_at or key.position, dtype=np.float64)
-
-
-INTERPOLATIONS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
-    "linear": linear,
-    "smooth": smooth,
-    "hold": hold,
-}
-TURNINGS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
-    "linear": arc,
-    "smooth": squad,
-    "hold": hold,
-}
 
 
 def orbit_pose(path: PathSpec, frame: float, fps: float) -> Pose:

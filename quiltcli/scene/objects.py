@@ -1,0 +1,310 @@
+"""The objects of a scene file: what each brings to the scene, at its start and in any frame."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from quiltcli.errors import MeshError, Problem, SceneError
+from quiltcli.geometry import FloatArray, normalized
+from quiltcli.job.frames import format_frames
+from quiltcli.job.sequence import MeshSequence, numbered
+from quiltcli.scene.bake import Baked, bake
+from quiltcli.scene.importers.asset import Asset, read_asset
+from quiltcli.scene.importers.gltf import FileLight, Playing, gltf_lights, gltf_parts
+from quiltcli.scene.importers.part import Part, placed
+from quiltcli.scene.materials import Surface
+from quiltcli.scene.movers import Mover, moved
+
+if TYPE_CHECKING:
+    from quiltcli.job.scene import ObjectSpec
+
+# Files of a sequence that are kept: the one that is shown and the one before it.
+_KEPT = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Brought:
+    """What an object brings to the scene.
+
+    Attributes:
+        asset: its mesh file.
+        baked: its triangles, in the world.
+        surfaces: those of its parts.
+        lights: those of its file, in the world.
+    """
+
+    asset: Asset
+    baked: Baked
+    surfaces: tuple[Surface, ...]
+    lights: tuple[FileLight, ...]
+
+
+class ObjectError(SceneError):
+    """An object that is wrong by another key than its mesh: `key`."""
+
+    key = ""
+
+
+class AnimationError(ObjectError):
+    """An animation that cannot be played."""
+
+    key = "animation"
+
+
+class SceneObject(Protocol):
+    """An object of the scene."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def playing(self) -> Playing | None:
+        """Which animations of its file are played."""
+
+    @property
+    def start(self) -> Brought:
+        """What it brings at its start."""
+
+    def at(self, frame: float, fps: float) -> Brought:
+        """What it brings in a frame; the same object where that has not changed."""
+
+    def absent(self, frames: Iterable[int]) -> Iterator[str]:
+        """Why there is nothing to show in some of the frames, one sentence for each reason."""
+
+
+def load_object(item: ObjectSpec, assets: dict[Path, Asset]) -> SceneObject:
+    """Read, place and bake an object as it is at its start.
+
+    Args:
+        item: what the scene file says of it.
+        assets: meshes that are read already; others are added.
+
+    Raises:
+        SceneError: the mesh cannot be read, or a sequence has no file for a number.
+    """
+    if item.sequence is not None:
+        return _load_sequence(item, item.sequence)
+    if item.mesh not in assets:
+        assets[item.mesh] = read_asset(item.mesh)
+    asset = assets[item.mesh]
+    playing = _playing(item, asset)
+    time = None if item.animation is None else item.animation.offset
+    matrix = None if item.transform is None else item.transform.at(item.transform.start)
+    return OneMesh(item, playing, time, matrix, bring(item, asset, playing, time, matrix))
+
+
+def bring(
+    item: ObjectSpec,
+    asset: Asset,
+    playing: Playing | None = None,
+    time: float | None = None,
+    matrix: FloatArray | None = None,
+) -> Brought:
+    """Place and bake an object.
+
+    Args:
+        item: what the scene file says of it.
+        asset: its mesh.
+        playing: which animations of the mesh are played.
+        time: of theirs, seconds.
+        matrix: world from the mesh's space (4, 4).
+
+    Raises:
+        SceneError: nothing of it can be drawn.
+    """
+    override = {} if item.material is None else item.material.model_dump(exclude_none=True)
+    parts, lights = asset.parts, () if asset.model is None else gltf_lights(asset.model, time, playing)
+    if playing is not None and asset.model is not None:
+        parts = gltf_parts(asset.model, time, playing)
+    baked = bake(_parts(parts, matrix, override), item.normals)
+    if playing is not None and asset.model is not None and baked.empty and time is not None:
+        baked = _from_rest(item, asset, baked, Mover(asset.model, playing, matrix, baked), override, time)
+    if not len(baked.triangles):
+        raise SceneError(Problem("every triangle is without area or not finite", str(item.mesh)))
+    surfaces = tuple(part.surface.overridden(override) for part in parts)
+    return Brought(asset, baked, surfaces, _placed_lights(lights, matrix))
+
+
+def _parts(parts: Sequence[Part], matrix: FloatArray | None, override: dict[str, object]) -> tuple[Part, ...]:
+    if matrix is not None:
+        parts = tuple(placed(part, matrix) for part in parts)
+    if "color" in override:
+        parts = tuple(replace(part, colors=None) for part in parts)
+    return tuple(parts)
+
+
+def _from_rest(
+    item: ObjectSpec, asset: Asset, baked: Baked, mover: Mover, override: dict[str, object], time: float
+) -> Baked:
+    """An object whose first pose flattens triangles, which others do not, baked at rest if that is better."""
+    rest = bake(_parts(asset.parts, mover.matrix, override), item.normals)
+    if rest.empty >= baked.empty:
+        return baked
+    vertices, normals = replace(mover, baked=rest).at(time)
+    return replace(rest, vertices=vertices, normals=normals)
+
+
+def _placed_lights(lights: Sequence[FileLight], matrix: FloatArray | None) -> tuple[FileLight, ...]:
+    return tuple(lights) if matrix is None else tuple(light.placed(matrix) for light in lights)
+
+
+def _playing(item: ObjectSpec, asset: Asset) -> Playing | None:
+    """How an object's animation is played, if it is."""
+    if item.animation is None:
+        return None
+    if asset.model is None or not asset.model.clips:
+        raise AnimationError(Problem("has no animation", str(item.mesh)))
+    playing = Playing(item.animation.clip, item.animation.after)
+    try:
+        asset.model.chosen(playing)
+    except MeshError as error:
+        raise AnimationError(error.problems) from error
+    return playing
+
+
+@dataclass(frozen=True, eq=False)
+class OneMesh:
+    """An object of one mesh file, whose triangles stay the same: still, on keyframes, or animated.
+
+    Attributes:
+        item: what the scene file says of it.
+        playing: which animations of its file are played.
+        time: of those at its start, seconds; None where there are none.
+        matrix: (4, 4) its place in the world at its start, or None.
+        start: what it brings then.
+    """
+
+    item: ObjectSpec
+    playing: Playing | None
+    time: float | None
+    matrix: FloatArray | None
+    start: Brought
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.item.name or self.item.mesh.stem
+
+    @cached_property
+    def _local(self) -> FloatArray:
+        """Vertices (V, 3) in the space of the mesh, in the order in which they are baked."""
+        joined = np.concatenate([part.vertices for part in self.start.asset.parts])
+        return joined[self.start.baked.source]
+
+    def at(self, frame: float, fps: float) -> Brought:
+        """What it brings in a frame; the same object where it stands as at its start."""
+        spec, place = self.item.animation, self.item.transform
+        time = None if spec is None else spec.seconds(frame, fps)
+        matrix = place.at(frame) if place is not None and place.moves else self.matrix
+        if time == self.time and np.array_equal(matrix, self.matrix):  # type: ignore[arg-type]
+            return self.start
+        model = self.start.asset.model
+        if time is None or model is None or self.playing is None:
+            assert matrix is not None
+            return self._carried(matrix)
+        vertices, normals = Mover(model, self.playing, matrix, self.start.baked).at(time)
+        lights = _placed_lights(gltf_lights(model, time, self.playing), matrix)
+        return replace(
+            self.start, baked=replace(self.start.baked, vertices=vertices, normals=normals), lights=lights
+        )
+
+    def _carried(self, matrix: FloatArray) -> Brought:
+        """What it brings where a matrix (4, 4) has taken it."""
+        assert self.matrix is not None
+        baked, model = self.start.baked, self.start.asset.model
+        # Normals go on from its start, where they are those of an object that does not move.
+        way = matrix @ np.linalg.inv(self.matrix)
+        vertices, _ = moved(matrix, self._local, np.empty((0, 3)))
+        _, normals = moved(way, np.empty((0, 3)), baked.normals.astype(np.float64))
+        assert normals is not None
+        lights = () if model is None else _placed_lights(gltf_lights(model), matrix)
+        new = replace(baked, vertices=vertices, normals=normalized(normals).astype(np.float32))
+        return replace(self.start, baked=new, lights=lights)
+
+    def absent(self, frames: Iterable[int]) -> Iterator[str]:
+        """Nothing is amiss: it has a place in every frame."""
+        yield from ()
+
+
+def _load_sequence(item: ObjectSpec, files: MeshSequence) -> NumberedMeshes:
+    there, missing = files.there(), files.missing()
+    if missing or not there:
+        lost = missing or tuple(files.numbers)
+        names = ", ".join(numbered(files.pattern, number).name for number in lost[:3])
+        more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
+        verb = "is" if len(lost) == 1 else "are"
+        advice = " (hold: nearest or hold: last shows others instead)" if there else ""
+        words = f"{names}{more} {verb} missing of {files.pattern}{advice}"
+        raise SceneError(Problem(words))
+    return NumberedMeshes(item, files, there)
+
+
+@dataclass(frozen=True, eq=False)
+class NumberedMeshes:
+    """An object of one mesh file a frame, whose triangles may change.
+
+    Attributes:
+        item: what the scene file says of it.
+        files: its files.
+        there: the numbers of those there are, ascending.
+    """
+
+    item: ObjectSpec
+    files: MeshSequence
+    there: tuple[int, ...]
+    _kept: OrderedDict[tuple[int, bytes], Brought] = field(default_factory=OrderedDict)
+
+    @property
+    def name(self) -> str:
+        """Its name: that of the files without their number."""
+        return self.item.name or self.item.mesh.stem.replace("#", "").rstrip("._- ") or self.item.mesh.stem
+
+    @property
+    def playing(self) -> Playing | None:
+        """Files of a sequence rest."""
+        return None
+
+    @cached_property
+    def start(self) -> Brought:
+        """What its first file brings."""
+        return self._shown(self.there[0], self.there[0])
+
+    def at(self, frame: float, fps: float) -> Brought:
+        """What it brings in a frame.
+
+        Raises:
+            SceneError: the frame has no file, or it cannot be read.
+        """
+        number = self.files.shown(frame, self.there)
+        if number is None:
+            raise SceneError([Problem(words) for words in self.absent([int(frame // 1)])])
+        return self._shown(number, frame)
+
+    def _shown(self, number: int, frame: float) -> Brought:
+        matrix = None if self.item.transform is None else self.item.transform.at(frame)
+        key = number, b"" if matrix is None else matrix.tobytes()
+        if key not in self._kept:
+            path = numbered(self.files.pattern, number)
+            self._kept[key] = bring(self.item, read_asset(path), matrix=matrix)
+            while len(self._kept) > _KEPT:
+                self._kept.popitem(last=False)
+        self._kept.move_to_end(key)
+        return self._kept[key]
+
+    def absent(self, frames: Iterable[int]) -> Iterator[str]:
+        """Frames that have no file and nothing to stand in for it."""
+        lost = [frame for frame in frames if self.files.shown(frame, self.there) is None]
+        if lost:
+            which = f"frame {lost[0]} has" if len(lost) == 1 else f"frames {format_frames(lost)} have"
+            yield (
+                f"{which} no file of {self.files.pattern} (frames: {format_frames(self.files.numbers)};"
+                " hold: nearest or hold: last shows others instead)"
+            )
