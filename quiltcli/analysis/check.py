@@ -37,6 +37,7 @@ from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
 from quiltcli.scene import Scene, load_scene
+from quiltcli.scene.motion import load_moving_scene
 from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import view_problems, viewers_of
 
@@ -99,9 +100,13 @@ class _Findings:
             if isinstance(name, str) and is_regular(path.parent / name):
                 self.check(path.parent / name)
 
-    def scene(self, path: Path, spec: SceneFile | Path | None) -> Scene | None:
-        """Load a scene, and note what it has to say."""
-        scene = self.run(load_scene, spec)
+    def scene(self, path: Path, spec: SceneFile | Path | None, job: JobFile | None = None) -> Scene | None:
+        """Load a scene, and note what it has to say, and what it lacks in a job's frames."""
+        if job is None or not isinstance(spec, SceneFile):
+            scene = self.run(load_scene, spec)
+        else:
+            scene, source = self.run(load_moving_scene, spec, float(job.fps)) or (None, None)
+            self.problems += source.problems(job.frames) if source is not None else ()
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
         return scene
@@ -158,7 +163,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.notices += job_warnings(job, facets, placed) if facets is not None else ()
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
-    scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene))
+    scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is not None and not found:
         viewers = viewers_of(job, job.frames)
         findings.problems += eye_problems(facets, viewers, job)

@@ -171,6 +171,19 @@ def _playing(item: ObjectSpec, asset: Asset) -> Playing | None:
 
 
 @dataclass(frozen=True, eq=False)
+class _Pose:
+    """What an object brought last: it may rest there."""
+
+    time: float | None
+    matrix: FloatArray | None
+    brought: Brought
+
+
+def _same(a: FloatArray | None, b: FloatArray | None) -> bool:
+    return a is b or (a is not None and b is not None and np.array_equal(a, b))
+
+
+@dataclass(frozen=True, eq=False)
 class OneMesh:
     """An object of one mesh file, whose triangles stay the same: still, on keyframes, or animated.
 
@@ -187,6 +200,7 @@ class OneMesh:
     time: float | None
     matrix: FloatArray | None
     start: Brought
+    _last: list[_Pose] = field(default_factory=list)
 
     @property
     def name(self) -> str:
@@ -204,17 +218,22 @@ class OneMesh:
         spec, place = self.item.animation, self.item.transform
         time = None if spec is None else spec.seconds(frame, fps)
         matrix = place.at(frame) if place is not None and place.moves else self.matrix
-        if time == self.time and np.array_equal(matrix, self.matrix):  # type: ignore[arg-type]
+        if time == self.time and _same(matrix, self.matrix):
             return self.start
+        if not self._last or self._last[0].time != time or not _same(self._last[0].matrix, matrix):
+            self._last[:] = [_Pose(time, matrix, self._posed(time, matrix))]
+        return self._last[0].brought
+
+    def _posed(self, time: float | None, matrix: FloatArray | None) -> Brought:
+        """What it brings at a time of its animations, where a matrix (4, 4) has taken it."""
         model = self.start.asset.model
         if time is None or model is None or self.playing is None:
             assert matrix is not None
             return self._carried(matrix)
         vertices, normals = Mover(model, self.playing, matrix, self.start.baked).at(time)
         lights = _placed_lights(gltf_lights(model, time, self.playing), matrix)
-        return replace(
-            self.start, baked=replace(self.start.baked, vertices=vertices, normals=normals), lights=lights
-        )
+        baked = replace(self.start.baked, vertices=vertices, normals=normals)
+        return replace(self.start, baked=baked, lights=lights)
 
     def _carried(self, matrix: FloatArray) -> Brought:
         """What it brings where a matrix (4, 4) has taken it."""

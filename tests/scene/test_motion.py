@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from quiltcli.analysis.check import check_files
 from quiltcli.analysis.info import describe
+from quiltcli.analysis.verify import VerifyOptions, verify
 from quiltcli.errors import JobError, SceneError
 from quiltcli.job import job_sha256, load_job, load_scene_file
 from quiltcli.render.buffers import new_buffers
@@ -21,7 +23,7 @@ from quiltcli.scene.motion import MovingScene, load_moving_scene
 from tests.helpers.gltf_files import one_square
 from tests.helpers.in_memory import CUBE, CUBE_FACES, icosphere
 from tests.helpers.tiny_job import replaced, write_tiny_job
-from tests.helpers.verified_jobs import EVERY, ball, found, obj, shoot, write_job
+from tests.helpers.verified_jobs import ball, found, obj, write_job
 
 FPS = 24.0
 LIT = "lights: [{type: ambient}]\n"
@@ -99,6 +101,7 @@ def test_what_does_not_move_stays_the_same_object(tmp_path):
     base, scene = source.base, source.scene_at(2)
     assert source.scene_at(1) is base
     assert source.scene_at(2) is scene
+    assert source.scene_at(5) is source.scene_at(6)
     for name in ("triangles", "colors", "flat", "object", "material", "materials", "lights", "uv"):
         assert getattr(scene, name) is getattr(base, name)
     still = np.unique(base.triangles[base.object == 1])
@@ -191,9 +194,7 @@ def test_a_sequence_shows_the_file_of_the_frame(tmp_path):
         np.testing.assert_array_equal(scene.vertices[ours], alone.vertices[alone.triangles])
 
 
-@pytest.mark.parametrize(
-    ("hold", "shown"), [("nearest", [2, 2, 2, 5, 5, 5]), ("last", [2, 2, 2, 2, 5, 5])]
-)
+@pytest.mark.parametrize(("hold", "shown"), [("nearest", [2, 2, 2, 5, 5, 5]), ("last", [2, 2, 2, 2, 5, 5])])
 def test_missing_files_may_be_held(tmp_path, hold, shown):
     sequence(tmp_path, (2, 5))
     source = moving(tmp_path, f"{{mesh: boat.####.obj, frames: 1-6, hold: {hold}}}")
@@ -204,8 +205,8 @@ def test_missing_files_may_be_held(tmp_path, hold, shown):
 def test_missing_files_are_an_error_that_names_them(tmp_path):
     sequence(tmp_path, (1, 2, 3, 9))
     assert fault(tmp_path, "{mesh: boat.####.obj, frames: 1-9}") == (
-        "moving.yaml:3:10: objects[0].mesh: boat.0004.obj, boat.0005.obj, boat.0006.obj and 2 more are missing"
-        " of boat.####.obj (hold: nearest or hold: last shows others instead)"
+        "moving.yaml:3:10: objects[0].mesh: boat.0004.obj, boat.0005.obj, boat.0006.obj and 2 more"
+        " are missing of boat.####.obj (hold: nearest or hold: last shows others instead)"
     )
 
 
@@ -266,7 +267,9 @@ def test_workers_and_one_process_draw_the_same_moving_scene_in_bounded_memory(tm
         "{mesh: boat.####.obj, frames: 1-6, transform: {scale: 0.5}}",
     )
     job = write_job(tmp_path, (CUBE, CUBE_FACES), ball(), (2.1, 1.7, 2.9))
-    (tmp_path / "job.yaml").write_text((tmp_path / "job.yaml").read_text().replace("scene.obj", "moving.yaml"))
+    (tmp_path / "job.yaml").write_text(
+        (tmp_path / "job.yaml").read_text().replace("scene.obj", "moving.yaml")
+    )
     stage = set_stage(load_job(tmp_path / "job.yaml"))
     assert source.base.objects == stage.scene.objects
     viewer = stage.views(job.frames)[0].viewer
@@ -289,21 +292,14 @@ def test_frames_of_a_moving_scene_hold_against_rays(tmp_path):
         "    - {frame: 4, translate: [0.4, 0, 0], rotate_deg: [0, 0, 90], scale: [1, 1, 2]}\n"
     )
     text = (tmp_path / "job.yaml").read_text().replace("scene.obj", "moving.yaml")
-    pictures = []
+    (tmp_path / "job.yaml").write_text(text.replace("frames: 1", "frames: 1-4"))
+    covered = []
     for frame in (2, 3):
-        (tmp_path / "job.yaml").write_text(text.replace("frames: 1", f"frames: {frame}"))
-        shot = shoot_at(load_job(tmp_path / "job.yaml"), frame)
-        assert found(shot.verify(EVERY)) == {}
-        pictures.append(shot.images.channels["Z"].tobytes())
-    assert pictures[0] != pictures[1]
-
-
-def shoot_at(job, frame):
-    """A shot of a frame, with the stage as it is then."""
-    from dataclasses import replace
-
-    shot = shoot(job)
-    return replace(shot, stage=shot.stage.at(frame))
+        options = VerifyOptions(everything=True, threads=1, frame=frame)
+        for one in verify(load_job(tmp_path / "job.yaml"), options):
+            assert found(one.verdict) == {}
+            covered.append(np.isfinite(one.images.channels["Z"]).tobytes())
+    assert covered[0] != covered[1]
 
 
 def test_info_says_what_moves(tmp_path):
@@ -320,3 +316,10 @@ def test_info_says_what_moves(tmp_path):
         "boat: 3 numbered files, frames 1-3",
     ]
     assert "moves" in json.dumps(info.data)
+
+
+def test_check_tells_the_frames_of_a_job_that_a_sequence_lacks(tmp_path):
+    job = tiny_sequence(tmp_path)
+    assert check_files([job]) == []
+    replaced(tmp_path, "job.yaml", "frames: 1-4", "frames: 1-6")
+    assert [problem.message.split(" of ")[0] for problem in check_files([job])] == ["frames 5-6 have no file"]

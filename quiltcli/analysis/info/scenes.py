@@ -12,7 +12,8 @@ from quiltcli.analysis.info.displays import areas, polygon_counts, polygons_text
 from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, number, vector
 from quiltcli.errors import MeshError
 from quiltcli.formats.mesh import read_mesh
-from quiltcli.job import load_scene_file
+from quiltcli.job import ObjectSpec, load_scene_file
+from quiltcli.job.frames import format_frames
 from quiltcli.scene import Light, Scene, load_scene
 from quiltcli.scene.lights import KINDS
 
@@ -23,7 +24,28 @@ def scene_info(path: Path) -> Info:
     Raises:
         JobError, SceneError: the scene cannot be loaded.
     """
-    return _info("scene", path, load_scene(load_scene_file(path)), {}, [])
+    spec = load_scene_file(path)
+    scene = load_scene(spec)
+    moves = {
+        name: how for name, item in zip(scene.objects, spec.objects, strict=True) if (how := _motion(item))
+    }
+    lines = [("moves", f"{name}: {how}") for name, how in moves.items()]
+    return _info("scene", path, scene, {"moves": moves}, lines)
+
+
+def _motion(item: ObjectSpec) -> str:
+    """How an object moves, empty where it does not."""
+    found = []
+    if item.transform is not None and item.transform.keyframes is not None and item.transform.moves:
+        frames = [key.frame for key in item.transform.keyframes]
+        found.append(f"{counted(len(frames), 'keyframe')}, frames {min(frames)} to {max(frames)}")
+    if item.animation is not None:
+        clip = item.animation.clip
+        what = "all animations" if clip == "all" else repr(clip) if isinstance(clip, str) else str(list(clip))
+        found.append(f"{what} of the file, from frame {item.animation.start_frame}")
+    if item.frames is not None:
+        found.append(f"{counted(len(item.frames), 'numbered file')}, frames {format_frames(item.frames)}")
+    return "; ".join(found)
 
 
 def mesh_info(path: Path) -> Info:
