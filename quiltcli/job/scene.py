@@ -95,7 +95,7 @@ class ObjectSpec(Model):
     mesh: Annotated[Path, MeshOrSequence()]
     """OBJ, PLY, OFF, STL or glTF; with a run of # for a number, such as boat.####.ply, one a frame."""
     frames: FrameRange | None = None
-    """Numbers of the files of a sequence."""
+    """Numbers of the files of a sequence, one a frame."""
     hold: Annotated[str, OneOf(("nearest", "last"))] | None = None
     """What a sequence shows where it has no file of the frame's number; without this key that is an error."""
     units: Units = "m"

@@ -118,8 +118,9 @@ def _mesh_scene(path: Path) -> Scene:
     """A mesh file as the only object, lit by the headlight."""
     from quiltcli.job.scene import ObjectSpec
 
+    asset = read_asset(path)
     gathered = _Gathered()
-    gathered.take(path.stem, bring(ObjectSpec(mesh=path), read_asset(path)), None)
+    gathered.take(path.stem, bring(ObjectSpec(mesh=path), asset), None)
     return _assembled(gathered, (), (0.0, 0.0, 0.0))
 
 
