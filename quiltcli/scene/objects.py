@@ -261,7 +261,7 @@ def _load_sequence(item: ObjectSpec, files: MeshSequence) -> NumberedMeshes:
         more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
         verb = "is" if len(lost) == 1 else "are"
         advice = " (hold: nearest or hold: last shows others instead)" if there else ""
-        words = f"{names}{more} {verb} missing of {files.pattern}{advice}"
+        words = f"{names}{more} {verb} missing from {files.pattern}{advice}"
         raise SceneError(Problem(words))
     return NumberedMeshes(item, files, there)
 

@@ -206,7 +206,7 @@ def test_missing_files_are_an_error_that_names_them(tmp_path):
     sequence(tmp_path, (1, 2, 3, 9))
     assert fault(tmp_path, "{mesh: boat.####.obj, frames: 1-9}") == (
         "moving.yaml:3:10: objects[0].mesh: boat.0004.obj, boat.0005.obj, boat.0006.obj and 2 more"
-        " are missing of boat.####.obj (hold: nearest or hold: last shows others instead)"
+        " are missing from boat.####.obj (hold: nearest or hold: last shows others instead)"
     )
 
 
