@@ -112,7 +112,10 @@ class ObjectSpec(Model):
     """Play the animation in the mesh file; without this key it rests."""
 
     def world_from_mesh(self, frame: float | None = None) -> FloatArray | None:
-        """World from mesh (4, 4) at a frame or at its start: units, up axis, transform; None where they are one."""
+        """World from mesh (4, 4) at a frame, or at its start: units, up axis, transform.
+
+        None where both are the same.
+        """
         place = self.transform
         world = None if place is None else place.at(place.start if frame is None else frame)
         if self.units == "m" and self.up_axis == "y":

@@ -97,7 +97,7 @@ def load_object(item: ObjectSpec, assets: dict[Path, Asset]) -> SceneObject:
     asset = assets[item.mesh]
     playing = _playing(item, asset)
     time = None if item.animation is None else item.animation.offset
-    matrix = None if item.transform is None else item.transform.at(item.transform.start)
+    matrix = item.world_from_mesh()
     return OneMesh(item, playing, time, matrix, bring(item, asset, playing, time, matrix))
 
 
@@ -217,7 +217,8 @@ class OneMesh:
         """What it brings in a frame; the same object where it stands as at its start."""
         spec, place = self.item.animation, self.item.transform
         time = None if spec is None else spec.seconds(frame, fps)
-        matrix = place.at(frame) if place is not None and place.moves else self.matrix
+        carried = place is not None and place.moves
+        matrix = self.item.world_from_mesh(frame) if carried else self.matrix
         if time == self.time and _same(matrix, self.matrix):
             return self.start
         if not self._last or self._last[0].time != time or not _same(self._last[0].matrix, matrix):
@@ -308,7 +309,7 @@ class NumberedMeshes:
         return self._shown(number, frame)
 
     def _shown(self, number: int, frame: float) -> Brought:
-        matrix = None if self.item.transform is None else self.item.transform.at(frame)
+        matrix = self.item.world_from_mesh(frame)
         key = number, b"" if matrix is None else matrix.tobytes()
         if key not in self._kept:
             path = numbered(self.files.pattern, number)

@@ -121,6 +121,12 @@ def test_a_frame_is_the_same_whatever_was_drawn_before(tmp_path):
             np.testing.assert_array_equal(getattr(scene, name), getattr(alone, name))
 
 
+def test_keyframes_carry_a_mesh_in_its_own_units_and_axes(tmp_path):
+    source = moving(tmp_path, f"{{mesh: cube.obj, units: cm, up_axis: z, transform: {{keyframes: [{WAY}]}}}}")
+    assert abs(source.base.vertices).max() == pytest.approx(0.01)
+    np.testing.assert_allclose(source.scene_at(3).vertices, source.base.vertices + [2, 0, 4], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("transform", "words"),
     [
