@@ -11,9 +11,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from quiltcli.errors import QuiltError
+from quiltcli.geometry.interpolation import smooth
 from quiltcli.job import PathSpec, ViewerSpec
 from quiltcli.viewer import viewer as viewers
-from quiltcli.viewer.paths import smooth
 from quiltcli.viewer.view import view_problems
 
 
