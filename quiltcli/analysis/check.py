@@ -160,7 +160,8 @@ def _check_job(findings: _Findings, path: Path) -> None:
     placed = findings.run(layout_for, choice, facets, layout_path(job.output.directory))
     if placed is not None:
         findings.run(demand_memory, job, placed)
-        findings.notices += job_warnings(job, facets, placed) if facets is not None else ()
+        if facets is not None and not found:
+            findings.notices += job_warnings(job, facets, placed)
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
     scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
