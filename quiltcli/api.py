@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.display import Facets, load_display
-from quiltcli.errors import JobError, QuiltError, ViewerError, raise_all
+from quiltcli.errors import JobError, QuiltError
 from quiltcli.formats.exr.image import Image, read_exr
 from quiltcli.images.facets import facet_image, page_of
 from quiltcli.images.preview import tone_map, write_png
@@ -37,7 +37,6 @@ from quiltcli.render.sequence import RenderOptions
 from quiltcli.render.sequence import render as render_job
 from quiltcli.render.setup import Stage as Setup
 from quiltcli.render.setup import set_stage
-from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import View, views_of
 from quiltcli.viewer.viewer import Viewer
 
@@ -174,8 +173,6 @@ def draw(what: Setup | Job, frames: Iterable[int] | None = None, *, threads: int
     setup = what if isinstance(what, Setup) else set_up(what)
     job = setup.job
     views = setup.views(job.frames if frames is None else frames)
-    everybody = [viewer for view in views for viewer in view.viewers]
-    raise_all(ViewerError, eye_problems(setup.facets, everybody, job))
     for view in views:
         buffers = new_buffers(setup)
         record = draw_view(setup.at(view.time), view, buffers, threads or default_threads())

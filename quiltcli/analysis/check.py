@@ -38,8 +38,7 @@ from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
-from quiltcli.viewer.edge_on import eye_problems
-from quiltcli.viewer.view import view_problems, viewers_of
+from quiltcli.viewer.view import view_problems
 
 T = TypeVar("T")
 
@@ -166,8 +165,6 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.run(read_layout, choice)
     scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is not None and not found:
-        viewers = viewers_of(job, job.frames)
-        findings.problems += eye_problems(facets, viewers, job)
         findings.notices += stereo_notices(job, facets, scene)
 
 

@@ -13,6 +13,7 @@ from quiltcli.layout import Layout
 from quiltcli.render.needs import disk_warnings
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words
+from quiltcli.viewer.edge_on import edge_on_notices
 from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import has_embree
@@ -51,6 +52,7 @@ def job_warnings(
             "the path does not say where the head looks, on which no picture for one eye depends; depth is"
             " measured along the line to the display's middle (render.depth: radial measures the distance)"
         )
+    yield from edge_on_notices(facets, viewers_of(job, job.frames if frames is None else frames))
     others = sorted(set(frames or ()) - set(job.frames))
     if others:
         known = format_frames(job.frames)

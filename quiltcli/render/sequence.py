@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.errors import CheckFailedError, JobError, OutputError, QuiltError, ViewerError, raise_all
+from quiltcli.errors import CheckFailedError, JobError, OutputError, QuiltError, raise_all
 from quiltcli.formats.exr.image import use_threads
 from quiltcli.formats.noted import noting_inputs
 from quiltcli.geometry import BoolArray
@@ -45,7 +45,6 @@ from quiltcli.render.report import FrameRecord, write_report
 from quiltcli.render.resume import clear_away, unfinished
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.render.workers import Pool, can_fork, shared_buffers, worth_forking
-from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import View, by_file, views_of
 
 _OF_THE_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EIO}
@@ -153,8 +152,6 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
         stage = set_stage(job, options.folder)
         job_sha = job_sha256(job)
         views = stage.views(frames)
-    viewers = [viewer for view in views for viewer in view.viewers]
-    raise_all(ViewerError, eye_problems(stage.facets, viewers, job))
     only = chosen_facets(stage, options.facets)
     out = outputs(stage, options.folder or job.output.directory, job_sha, options.facets)
     if only is not None:

@@ -134,3 +134,11 @@ def test_two_eyes_go_no_farther_than_their_head(tmp_path):
     from quiltcli.analysis.info import describe
 
     assert describe(ball_job(tmp_path).source.path).data["path_length_m"] == 0
+
+
+def test_a_facet_that_is_a_line_to_the_eye_is_dark_and_the_others_are_drawn(tmp_path):
+    job = write_job(tmp_path, (CUBE, CUBE_FACES), ball(), (1.0, 0.3, 4.0))
+    [record] = render(job)
+    assert record.visible_pixels > 100
+    found = list(verify(job, VerifyOptions(everything=True)))
+    assert all(one.verdict.passed and one.verdict.lit == 1 for one in found)

@@ -32,7 +32,7 @@ from quiltcli.analysis.verify.images import Images
 from quiltcli.analysis.verify.pixels import Trial
 from quiltcli.analysis.verify.seams import SeamPoints, check_seams, seam_points
 from quiltcli.display import shared_edges
-from quiltcli.errors import JobError, ViewerError, raise_all
+from quiltcli.errors import JobError
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
 from quiltcli.images.preview import Bytes
 from quiltcli.job import JobFile
@@ -40,7 +40,6 @@ from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.methods import draw_frame
 from quiltcli.render.setup import Stage, set_stage
-from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 
@@ -124,7 +123,6 @@ def compare(job: JobFile, options: CompareOptions | None = None) -> Study:
     viewers_of(job, [frame])
     stage = set_stage(with_variant(job, REFERENCE)).at(frame)
     viewers = stage.views([frame])[0].viewers
-    raise_all(ViewerError, eye_problems(stage.facets, viewers, job))
     variants = (REFERENCE, *(v for v in dict.fromkeys(options.variants) if v != REFERENCE))
     threads = options.threads or default_threads()
     options.begin(REFERENCE.name)

@@ -19,14 +19,13 @@ from quiltcli.analysis.verify.sample import every_pixel, sampled_pixels
 from quiltcli.analysis.verify.seams import Seams, check_seams, seam_points
 from quiltcli.analysis.verify.tally import Fault, Tally
 from quiltcli.display import shared_edges
-from quiltcli.errors import JobError, Problem, ViewerError, raise_all
+from quiltcli.errors import JobError, Problem
 from quiltcli.geometry import IntArray
 from quiltcli.job import JobFile
 from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.crew import default_threads
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.clip import their_lit_facets
-from quiltcli.viewer.edge_on import eye_problems
 from quiltcli.viewer.view import View, views_of
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import aim
@@ -148,8 +147,6 @@ def verify(job: JobFile, options: VerifyOptions | None = None) -> Iterator[Verif
     wanted = _wanted_eyes(job, views_of(job, [frame]), options.eye)  # before anything is loaded
     stage = set_stage(job, options.folder)
     views = [view for view in stage.views([frame]) if view.eye in wanted]
-    viewers = [viewer for view in views for viewer in view.viewers]
-    raise_all(ViewerError, eye_problems(stage.facets, viewers, job))
     threads = options.threads or default_threads()
     folder = options.folder or job.output.directory
     for view in views:
