@@ -103,10 +103,8 @@ def test_an_eye_in_the_plane_of_a_facet_is_told(tiny: Path) -> None:
     assert [str(problem) for problem in check_files([Path("job.yaml")], said.append)] == [
         "scene.yaml:3:22: objects[0].mesh: ball.obj: holds no triangles"
     ]
-    words = (
-        "at frame 2 the eye lies in the plane of facet 2 (right): dark there, for it would be a line to it"
-    )
-    assert words in checked.notices
+    words = "at frame 2 the eye lies in the plane of facet 2 (right): dark there"
+    assert any(word.startswith(words) for word in said)
 
 
 def test_the_same_problem_of_two_files_is_told_once(tiny: Path) -> None:
