@@ -44,6 +44,8 @@ def share_behind(facets: Facets, viewer: Viewer) -> float:
 
     By area: the part of each facet's polygon, in its pixels, on the far side of the plane through the eye.
     """
+    if not sees_behind(facets, viewer):
+        return 0.0
     lit = np.flatnonzero(their_lit_facets(facets, viewer))
     ahead, pixels = _ahead(facets, viewer), corner_pixels(facets)
     whole = behind = 0.0
