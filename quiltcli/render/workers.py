@@ -19,11 +19,10 @@ import os
 import signal
 import sys
 import threading
-import traceback
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from multiprocessing.util import Finalize
 from operator import itemgetter
 from typing import Any
@@ -35,31 +34,25 @@ from quiltcli.channels import exr_channels
 from quiltcli.ending import SIGNALS
 from quiltcli.errors import CheckFailedError, Problem
 from quiltcli.geometry import BoolArray
-from quiltcli.projection.planar import QuiltRays, quilt_rays
+from quiltcli.projection.planar import QuiltRays
 from quiltcli.render.arena import (
     Arena,
     arena_names,
-    arena_of,
-    fill_tables,
-    moved_scene,
     new_arena,
     share_scene,
 )
-from quiltcli.render.batch import Drawn, draw_batch
-from quiltcli.render.buffers import Buffers, clear_blocks
+from quiltcli.render.batch import Drawn
+from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import Threads, plan_of
 from quiltcli.render.setup import Stage
-from quiltcli.render.shared import AttachedArrays, SharedArrays
+from quiltcli.render.shared import SharedArrays
+from quiltcli.render.workplace import Fault, Item, Moved, Task, Workplace, serve
 from quiltcli.viewer.viewer import Viewer
-from quiltcli.visibility.draw import Frame, pairs_by_block
+from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import (
     Binned,
-    BinPlan,
-    Share,
     bin_frame,
-    bin_share,
     join,
-    see_vertices,
     sight_of,
 )
 
@@ -105,29 +98,6 @@ def shared_buffers(stage: Stage) -> Buffers:
 
 
 @dataclass(frozen=True)
-class _Task:
-    """What a worker is told of a frame before its work: the viewer, and the facets (F,) that are drawn."""
-
-    viewer: Viewer
-    lit: BoolArray
-
-
-@dataclass(frozen=True)
-class _Moved:
-    """A worker is told that the scene has moved: fields that are no arrays; the arrays follow."""
-
-    plain: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class _Item:
-    """A piece of work: a method of `_Workplace`, and what it is given."""
-
-    name: str
-    given: tuple[Any, ...]
-
-
-@dataclass(frozen=True)
 class _Worker:
     """A forked process and our end of the line to it."""
 
@@ -147,7 +117,7 @@ class _Worker:
             answer = self.connection.recv()
         except (EOFError, OSError):
             raise self._died(frame) from None
-        if isinstance(answer, _Fault):
+        if isinstance(answer, Fault):
             words = f"frame {frame}: a worker failed:\n{answer.traceback}"
             raise RuntimeError(words)  # noqa: TRY004 — the type is right; it is the news that is bad
         return answer
@@ -161,13 +131,6 @@ class _Worker:
             " (out of memory? fewer threads or smaller pages need less)" if code == -signal.SIGKILL else ""
         )
         return CheckFailedError(Problem(f"frame {frame}: a worker process {how}{advice}"))
-
-
-@dataclass(frozen=True)
-class _Fault:
-    """What a worker answers when something in it failed."""
-
-    traceback: str
 
 
 class Pool:
@@ -192,7 +155,7 @@ class Pool:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         try:
             for _number in range(workers):
-                self._workers.append(_forked(_Workplace(stage, buffers, self._arena)))
+                self._workers.append(_forked(Workplace(stage, buffers, self._arena)))
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         except BaseException:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -225,9 +188,9 @@ class Pool:
         self._arena = self._new_arena(stage)
         handles = self._arrays.handles([*names, *arena_names()])
         for worker, known in zip(self._workers, self._known, strict=True):
-            worker.tell(self._frame, _Moved(plain))
+            worker.tell(self._frame, Moved(plain))
             self._arrays.send(worker.connection, handles, known)
-        self._share_out(_Item("tables", (part,)) for part in self._shares(len(new.triangles)))
+        self._share_out(Item("tables", (part,)) for part in self._shares(len(new.triangles)))
 
     def _new_arena(self, stage: Stage) -> Arena:
         return new_arena(self._arrays, stage.scene, self._shares_of_triangles, len(stage.blocks.facet))
@@ -240,11 +203,11 @@ class Pool:
         """
         self._frame = viewer.frame
         for worker in self._workers:
-            worker.tell(self._frame, _Task(viewer, rays.lit))
+            worker.tell(self._frame, Task(viewer, rays.lit))
         seen, arena = self._arena.seen, self._arena
-        self._share_out(_Item("see", (part,)) for part in self._shares(len(seen.vertices)))
+        self._share_out(Item("see", (part,)) for part in self._shares(len(seen.vertices)))
         parts = self._shares(len(seen.cut))
-        shares = self._share_out(_Item("bin", (number, part)) for number, part in enumerate(parts))
+        shares = self._share_out(Item("bin", (number, part)) for number, part in enumerate(parts))
         if None in shares:
             return bin_frame(plan_of(self._stage, viewer, rays))
         sight = sight_of(self._stage.scene, seen, culling=self._stage.job.render.backface_culling)
@@ -254,7 +217,7 @@ class Pool:
         """Empty the pixels of blocks in one of the pool's buffers."""
         index = self._index(buffers)
         parts = [part for part in np.array_split(blocks, _SHARES * self.workers) if part.size]
-        self._share_out(_Item("clear", (part, index)) for part in parts)
+        self._share_out(Item("clear", (part, index)) for part in parts)
 
     def draw(
         self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
@@ -267,7 +230,7 @@ class Pool:
         cost = [int(pairs.per_block[first:last].sum()) for first, last in work]
         dearest = np.argsort(cost, kind="stable")[::-1].tolist()
         tiles = self._stage.blocks.tiles
-        done = self._share_out(_Item("draw", (work[i], index, stale[tiles(work[i])])) for i in dearest)
+        done = self._share_out(Item("draw", (work[i], index, stale[tiles(work[i])])) for i in dearest)
         return [one for _, one in sorted(zip(dearest, done, strict=True), key=itemgetter(0))]
 
     def _index(self, buffers: Buffers) -> int:
@@ -278,7 +241,7 @@ class Pool:
         ends = np.linspace(0, count, _SHARES * self.workers + 1).astype(np.int64).tolist()
         return [slice(first, last) for first, last in pairwise(ends)]
 
-    def _share_out(self, items: Iterable[_Item]) -> list[Any]:
+    def _share_out(self, items: Iterable[Item]) -> list[Any]:
         """Hand out work as workers become free; the answers in the order of the items."""
         waiting = list(items)[::-1]
         answers: list[Any] = [None] * len(waiting)
@@ -299,75 +262,11 @@ class Pool:
         return answers
 
 
-class _Workplace:
-    """What a worker has at hand; its public methods are the work it can be given."""
-
-    def __init__(self, stage: Stage, buffers: Sequence[Buffers], arena: Arena) -> None:
-        self._stage, self._buffers, self._arena = stage, buffers, arena
-        self._arrays = AttachedArrays()
-        self._plan: BinPlan | None = None
-        self._frame: Frame | None = None
-
-    def begin(self, task: _Task) -> None:
-        """Turn to another frame."""
-        rays = quilt_rays(self._stage.layout, task.lit, task.viewer.eye)
-        self._plan, self._frame = plan_of(self._stage, task.viewer, rays), None
-
-    def move(self, moved: _Moved, connection: Connection) -> None:
-        """Take over a scene that has moved."""
-        arrays = self._arrays.receive(connection)
-        self._arena = arena_of(arrays)
-        self._stage = replace(self._stage, scene=moved_scene(self._stage.scene, moved.plain, arrays))
-
-    def tables(self, part: slice) -> None:
-        """Work out the tables of some triangles of a scene that has moved."""
-        fill_tables(self._stage.scene, part)
-
-    def see(self, part: slice) -> None:
-        """Find out about some of the vertices."""
-        see_vertices(self.plan, part, self._arena.seen)
-
-    def bin(self, number: int, part: slice) -> Share | None:
-        """Bin some of the triangles.
-
-        Returns:
-            the share without its keys, whose pairs go into the arena; None if there is no room for so many.
-        """
-        share = bin_share(self.plan, part, self._arena.seen)
-        first, end = self._arena.begin(part.start), self._arena.begin(part.stop)
-        if share.keys.size > end - first:
-            return None
-        found, kept = pairs_by_block([share.keys], self._stage.blocks), self._arena.pairs
-        kept.memory[first : first + share.keys.size] = found.memory
-        kept.first[number] = first + found.first[0]
-        kept.count[number] = found.count[0]
-        return replace(share, keys=share.keys[:0])
-
-    def clear(self, blocks: NDArray[np.int64], index: int) -> None:
-        """Empty the pixels of some blocks."""
-        clear_blocks(self._stage, blocks, self._buffers[index])
-
-    def draw(self, batch: tuple[int, int], index: int, stale: BoolArray) -> Drawn:
-        """Draw a batch."""
-        if self._frame is None:
-            seen, plan, stage = self._arena.seen, self.plan, self._stage
-            sight = sight_of(stage.scene, seen, culling=plan.culling)
-            pairs = self._arena.frame_pairs()
-            self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs)
-        return draw_batch(self._stage, self._frame, batch, self._buffers[index], stale)
-
-    @property
-    def plan(self) -> BinPlan:
-        """How the frame is binned."""
-        assert self._plan is not None, "no frame has begun"
-        return self._plan
-
-
-def _forked(place: _Workplace) -> _Worker:
+def _forked(place: Workplace) -> _Worker:
     """A new worker."""
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(theirs, place, os.getpid()), daemon=True)
+    process = context.Process(target=serve, args=(theirs, place, os.getpid()), daemon=True)
     process.start()
     theirs.close()
     return _Worker(process, ours)
@@ -381,25 +280,3 @@ def _kill(workers: list[_Worker]) -> None:
         worker.process.kill()
     while workers:
         workers.pop().process.join()
-
-
-def _serve(connection: Connection, place: _Workplace, parent: int) -> None:
-    """A worker's life: take frames and work, answer; end when the parent is gone."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)  # both may reach a whole group; the parent decides
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-    with contextlib.suppress(EOFError, OSError):
-        while True:
-            while not connection.poll(1.0):
-                if os.getppid() != parent:
-                    os._exit(0)
-            given = connection.recv()
-            try:
-                if isinstance(given, _Task):
-                    place.begin(given)
-                elif isinstance(given, _Moved):
-                    place.move(given, connection)
-                else:
-                    connection.send(getattr(place, given.name)(*given.given))
-            except Exception:
-                connection.send(_Fault(traceback.format_exc()))

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from quiltcli.errors import CheckFailedError
-from quiltcli.render import arena
-from quiltcli.render import workers as pools
+from quiltcli.render import arena, workplace
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.workers import Pool, can_fork, shared_buffers
@@ -131,7 +130,7 @@ def test_a_fault_in_a_worker_is_told_with_its_traceback(stage, monkeypatch):
     def fail(*given):
         raise ZeroDivisionError("no such thing")
 
-    monkeypatch.setattr(pools, "draw_batch", fail)
+    monkeypatch.setattr(workplace, "draw_batch", fail)
     buffers = shared_buffers(stage)
     with (
         Pool(stage, [buffers], 2) as pool,
