@@ -38,7 +38,7 @@ from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
-from quiltcli.viewer.view import view_problems
+from quiltcli.viewer.view import facet_problems, view_problems
 
 T = TypeVar("T")
 
@@ -163,6 +163,8 @@ def _check_job(findings: _Findings, path: Path) -> None:
             findings.notices += job_warnings(job, facets, placed)
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
+    if facets is not None:
+        findings.problems += facet_problems(job, facets.count)
     scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is not None and not found:
         findings.notices += stereo_notices(job, facets, scene)

@@ -50,9 +50,14 @@ def _lines(stream: TextIO) -> Iterator[Progress]:
     def frame_done(record: FrameRecord) -> None:
         nonlocal done
         done += 1
-        say(f"frame {record.frame} ({done} of {frames}): {frame_line(record)}")
+        say(f"frame {_named(record)} ({done} of {frames}): {frame_line(record)}")
 
     yield Progress(begin, frame_done, say)
+
+
+def _named(record: FrameRecord) -> str:
+    """Frame, and eye where there are two."""
+    return f"{record.frame}, {record.eye} eye" if record.eye else str(record.frame)
 
 
 @contextlib.contextmanager
@@ -70,7 +75,7 @@ def _bar(stream: TextIO) -> Iterator[Progress]:
             bar.update(task, total=count)
 
         def frame_done(record: FrameRecord) -> None:
-            bar.update(task, advance=1, description=f"frame {record.frame}: {frame_line(record)}")
+            bar.update(task, advance=1, description=f"frame {_named(record)}: {frame_line(record)}")
 
         def say(line: str) -> None:
             bar.console.print(line, markup=False, highlight=False)

@@ -14,7 +14,7 @@ import numpy as np
 
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.drawing.font import HEIGHT, text_mask, text_width
-from quiltcli.images.names import facet_path, name_of, quilt_path
+from quiltcli.images.names import ImageName, name_of
 from quiltcli.images.preview import Bytes, Look, display_values, image_colors, scaled_down, write_values
 from quiltcli.job.frames import format_frames
 
@@ -62,22 +62,21 @@ def contact_sheet(out: Path, picture: Path, sheet: Sheet | None = None) -> tuple
 
 def chosen_images(out: Path, sheet: Sheet) -> list[tuple[str, Path]]:
     """Label and file of every image on the sheet, by frame, then by page or facet (OutputError)."""
-    known = sorted(_images(out))
-    kind = sheet.kind or ("page" if any(found[0] == "page" for found in known) else "facet")
-    known = [found for found in known if found[0] == kind]
+    known = sorted(_images(out), key=lambda item: (item[0].kind, item[0].frame, item[0].number, item[0].eye))
+    kind = sheet.kind or ("page" if any(name.kind == "page" for name, _ in known) else "facet")
+    known = [(name, path) for name, path in known if name.kind == kind]
     if not known:
         wrong = f"has no images of {kind}s (expected the folder that quilt render has written to)"
         raise OutputError(Problem(wrong, file=str(out)))
-    there = sorted({frame for _, frame, _ in known})
+    there = sorted({name.frame for name, _ in known})
     wanted = set((there if kind == "page" else there[:1]) if sheet.frames is None else sheet.frames)
     if missing := sorted(wanted - set(there)):
         wrong = f"has no {kind}s of frame {missing[0]} (it has {format_frames(there)})"
         raise OutputError(Problem(wrong, file=str(out)))
-    path_of = quilt_path if kind == "page" else facet_path
     found = [
-        (f"{kind} {number}, frame {frame}", path_of(out, number, frame))
-        for _, frame, number in known
-        if frame in wanted
+        (f"{kind} {name.number}, frame {name.frame}" + (f", {name.eye}" if name.eye else ""), path)
+        for name, path in known
+        if name.frame in wanted
     ]
     if len(found) > MOST:
         raise OutputError(
@@ -86,11 +85,11 @@ def chosen_images(out: Path, sheet: Sheet) -> list[tuple[str, Path]]:
     return found
 
 
-def _images(out: Path) -> Iterator[tuple[str, int, int]]:
-    """Kind, frame and number of every image of a folder."""
+def _images(out: Path) -> Iterator[tuple[ImageName, Path]]:
+    """Every image of a folder, with what its name says."""
     for path in (*out.glob("quilt/page_*.exr"), *out.glob("facets/facet_*.exr")):
         if found := name_of(path):
-            yield found.kind, found.frame, found.number
+            yield found, path
 
 
 def _thumbnail(path: Path, sheet: Sheet) -> Bytes:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem, raise_all
-from quiltcli.formats.exr.image import read_exr
+from quiltcli.formats.exr.image import read_first
 from quiltcli.formats.png import save_png
 from quiltcli.formats.whole import make_folder, whole_file
 from quiltcli.geometry import Float32Array
@@ -246,7 +246,7 @@ def image_colors(image: Path) -> NDArray[Any]:
     Raises:
         OutputError: the image cannot be read or has no colours.
     """
-    found = read_exr(image)
+    found = read_first(image)
     if missing := [name for name in "RGB" if name not in found.channels]:
         have = ", ".join(found.channels)
         wrong = f"has no channel {missing[0]}, expected R, G and B (it has {have})"

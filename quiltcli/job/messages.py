@@ -64,13 +64,16 @@ def _unknown(key: Key, siblings: Sequence[type[BaseModel]], root: type[BaseModel
 
 def _models_at(model: type[BaseModel], loc: Sequence[str | int]) -> list[type[BaseModel]]:
     """Models whose key the last part of `loc` would be."""
-    models = [model]
+    models, named = [model], False
     for part in loc[:-1]:
         if isinstance(part, str) and part.startswith("<"):
             models = [m for m in models if m.__name__ == part[1:-1]]
+        elif named:  # the user's own name of a mapping's entry
+            named = False
         elif isinstance(part, str) and part != "[key]":
             fields = [m.model_fields[part].annotation for m in models if part in m.model_fields]
             models = [inner for field in fields for inner in _models_in(field)]
+            named = any("dict[str" in str(field) for field in fields)
     return models
 
 

@@ -256,6 +256,8 @@ class StereoSpec(Model):
 def _facets(value: Any) -> Any:
     if value is None or isinstance(value, tuple):
         return value
+    if isinstance(value, list) and all(type(one) is int for one in value):
+        value = ",".join(map(str, value))
     if isinstance(value, bool) or not isinstance(value, (str, int)):
         raise complaint(f"expected facets such as 1-3 or 1,5,7-9, got {describe(value)}")
     try:

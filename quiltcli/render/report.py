@@ -237,7 +237,9 @@ def summary_table(records: Sequence[FrameRecord]) -> Table:
 
 def _frames_text(records: Sequence[FrameRecord]) -> str:
     numbers = [record.frame for record in records]
-    return f"{len(numbers)} ({min(numbers)} to {max(numbers)})" if len(numbers) > 1 else f"1 ({numbers[0]})"
+    frames, eyes = len(set(numbers)), ", two eyes" * any(record.eye for record in records)
+    which = f"{min(numbers)} to {max(numbers)}" if frames > 1 else str(numbers[0])
+    return f"{frames} ({which}{eyes})"
 
 
 def _summed(times: Iterable[Mapping[str, float]]) -> dict[str, float]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.display import Facets, load_display
-from quiltcli.errors import SceneError, raise_all
+from quiltcli.errors import JobError, SceneError, raise_all
 from quiltcli.geometry import OwnerArray
 from quiltcli.images.names import layout_path
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
@@ -21,7 +21,7 @@ from quiltcli.scene import Scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
 from quiltcli.viewer.clip import settled_clip
-from quiltcli.viewer.view import View, views_of
+from quiltcli.viewer.view import View, facet_problems, views_of
 from quiltcli.visibility.binning.pairs import Parts, facet_parts
 from quiltcli.visibility.draw import Blocks, cut_blocks
 
@@ -86,6 +86,7 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     """
     kept = layout_path(folder or job.output.directory)
     facets = load_display(load_display_file(job.display))
+    raise_all(JobError, facet_problems(job, facets.count))
     layout = layout_for(job.layout or PackSpec(), facets, kept)
     demand_memory(job, layout)
     scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))

@@ -138,6 +138,15 @@ def views_of(job: JobFile, frames: Iterable[int], clip: str | None = None) -> li
     return views
 
 
+def facet_problems(job: JobFile, count: int) -> list[Problem]:
+    """What is wrong with the facets that viewers are given, on a display of so many."""
+    return [
+        spec.source.problem("facets", f"there is no facet {max(spec.facets)} (the display has 1 to {count})")
+        for spec in job.people.values()
+        if spec.facets and max(spec.facets) > count
+    ]
+
+
 def by_file(views: Iterable[View]) -> list[tuple[View, ...]]:
     """The views in groups that share their files: both eyes where they are parts, else each alone."""
     groups: dict[tuple[int, str], list[View]] = {}

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from quiltcli.analysis.verify import VerifyOptions, verify
 from quiltcli.cli import main
+from quiltcli.errors import JobError
 from quiltcli.formats.exr.image import read_exr, read_header, read_parts
 from quiltcli.job import load_job
 from quiltcli.render.sequence import RenderOptions, render
@@ -142,3 +143,71 @@ def test_a_facet_that_is_a_line_to_the_eye_is_dark_and_the_others_are_drawn(tmp_
     assert record.visible_pixels > 100
     found = list(verify(job, VerifyOptions(everything=True)))
     assert all(one.verdict.passed and one.verdict.lit == 1 for one in found)
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    from tests.viewer.test_view import job_with
+
+    folder = tmp_path_factory.mktemp("two")
+    job = job_with(folder, two_viewers("1-3", '"4,5"'), "output: {channels: [rgba, Z, triangle]}\n")
+    render(job)
+    return folder
+
+
+def quilt(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def test_the_job_of_two_viewers_that_a_render_leaves_is_read_again(two):
+    assert quilt("check", two / "out" / "job.yaml").exit_code == 0
+
+
+def test_facets_that_are_not_there_are_told(tmp_path):
+    from tests.viewer.test_view import job_with
+
+    job_with(tmp_path, two_viewers("1-3", '"4,9"'))
+    for command in ("check", "render"):
+        said = quilt(command, tmp_path / "job.yaml")
+        assert said.exit_code in (1, 2)
+        assert "viewers.bob.facets: there is no facet 9 (the display has 1 to 6)" in said.output
+
+
+def test_keys_of_a_viewer_are_suggested(tmp_path):
+    from tests.viewer.test_view import job_with
+
+    with pytest.raises(JobError, match=r"viewers.ann.faar: unknown key \(did you mean 'far'\?\)"):
+        job_with(tmp_path, two_viewers("1", "2").replace("ann: {", "ann: {faar: 3, "))
+
+
+def test_each_viewer_has_a_picture_of_their_own_facets(two):
+    said = quilt("simulate", two / "job.yaml", "-o", two / "eye.png", "--size", "160x120")
+    assert said.exit_code == 0, said.output
+    assert (two / "eye.ann.png").exists()
+    assert (two / "eye.bob.png").exists()
+
+
+def test_pages_of_one_eye_are_no_pages_of_two(two, tmp_path):
+    said = quilt("stereo", two / "out", "-o", tmp_path / "x", "--as", "sequential")
+    assert said.exit_code == 2
+    assert "has no pages of two eyes" in said.output
+
+
+@pytest.mark.parametrize("kind", ["--pages", "--facets"])
+def test_a_sheet_shows_both_eyes(rendered, tmp_path, kind):
+    folder, _, _ = rendered
+    said = quilt("contact", folder / "out", "-o", tmp_path / "sheet.png", kind, "--width", "64")
+    assert said.exit_code == 0, said.output
+    assert f"{2 if kind == '--pages' else 12} images" in said.output
+
+
+def test_a_page_shows_the_left_eye(rendered, tmp_path):
+    folder, _, _ = rendered
+    said = quilt("view", folder / "out", "-o", tmp_path / "page.html")
+    assert said.exit_code == 0, said.output
+
+
+def test_parts_are_looked_at_by_the_left_eyes(tmp_path):
+    render(ball_job(tmp_path, more="output: {channels: [rgba], stereo: parts}\n"))
+    said = quilt("preview", tmp_path / "out" / "quilt" / "page_01.0001.exr", "-o", tmp_path / "a.png")
+    assert said.exit_code == 0, said.output

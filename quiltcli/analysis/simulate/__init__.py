@@ -93,7 +93,7 @@ class Simulation:
         direct: (H, W, 3) the scene without a display, None where there is nothing to compare with.
         comparison: the figures, None likewise.
         source: where the facets' images came from, in words.
-        eye: `left` or `right`, empty where there is one eye or it is seen from another place.
+        eye: whose picture it is where there are several: viewer, and eye of two (`ann.left`).
     """
 
     frame: int
@@ -128,10 +128,13 @@ def simulate(
     views = [view for view in stage.views(frames) if options.eye in ("", view.eye)]
     if not views:
         raise JobError(f"--eye {options.eye}: the job has one eye (viewer.stereo gives it two)")
-    for view in views:
-        now, viewer = stage.at(view.time), view.viewer
-        shown, source = shown_images(now, view, job.output.directory, sha, threads)
-        yield replace(take_picture(now, viewer, shown, options), source=source, eye=view.eye)
+    # Frame by frame and viewer by viewer, the left eye before the right.
+    seen = [(view, number) for view in views for number in range(len(view.viewers))]
+    for view, number in sorted(seen, key=lambda item: (item[0].frame, item[1])):
+        now, viewer = stage.at(view.time), view.viewers[number]
+        shown, source = shown_images(now, view, job.output.directory, sha, threads, viewer)
+        whose = ".".join(filter(None, (viewer.name, view.eye)))
+        yield replace(take_picture(now, viewer, shown, options), source=source, eye=whose)
 
 
 def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:

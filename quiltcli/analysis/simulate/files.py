@@ -60,6 +60,8 @@ def write_pictures(
         QuiltError: bad input, or a file that cannot be written.
     """
     _check(frames, options, pictures)
+    if len(job.people) > 1 and pictures.video:
+        raise JobError("a film shows one viewer's picture (expected a job with viewer)")
     if job.is_stereo and pictures.video and not (options.eye or pictures.glasses):
         raise JobError("a film shows one picture at a time (choose --eye left, --eye right or --glasses)")
     if pictures.glasses and (not job.is_stereo or options.eye):
@@ -83,7 +85,8 @@ def through_glasses(seen: Iterator[Simulation], matrix: str) -> Iterator[Simulat
         right = next(seen)
         first, second = (np.ascontiguousarray(one.picture.transpose(2, 0, 1)) for one in (left, right))
         mixed = anaglyph(first, second, MATRICES[matrix]).transpose(1, 2, 0)
-        yield replace(left, picture=mixed, direct=None, comparison=None, eye="")
+        whose = left.eye.removesuffix("left").strip(".")
+        yield replace(left, picture=mixed, direct=None, comparison=None, eye=whose)
 
 
 def _write_picture(result: Simulation, pictures: Pictures) -> Iterator[str]:

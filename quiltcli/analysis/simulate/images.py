@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.analysis.simulate.lookup import Shown
-from quiltcli.display import lit_facets
 from quiltcli.formats.exr.image import read_exr
 from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.images.facets import page_of, quilt_buffers
@@ -18,10 +17,14 @@ from quiltcli.layout import pixel_owners
 from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.methods import draw_view
 from quiltcli.render.setup import Stage
+from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import View
+from quiltcli.viewer.viewer import Viewer
 
 
-def shown_images(stage: Stage, view: View, folder: Path, job_sha: str, threads: int) -> tuple[Shown, str]:
+def shown_images(
+    stage: Stage, view: View, folder: Path, job_sha: str, threads: int, viewer: Viewer | None = None
+) -> tuple[Shown, str]:
     """The images of one frame.
 
     Args:
@@ -30,12 +33,13 @@ def shown_images(stage: Stage, view: View, folder: Path, job_sha: str, threads: 
         folder: where a render of the job leaves its files.
         job_sha: hash a file must have to be taken for this job's.
         threads: batches drawn at a time.
+        viewer: whose facets are shown; the view's first by default.
 
     Returns:
         The images, and where they came from in words.
     """
-    viewer = view.viewer
-    lit = lit_facets(stage.facets, viewer.eye) & (stage.layout.page >= 0)
+    viewer = viewer or view.viewer
+    lit = their_lit_facets(stage.facets, viewer) & (stage.layout.page >= 0)
     buffers: Buffers | None = None
     owners: OwnerArray = stage.owners
     if (buffers := _quilts(stage, view, folder, job_sha)) is not None:

@@ -86,10 +86,11 @@ def images_sha(folder: Folder, frame: int) -> str:
         OutputError: the frame is not there, not whole, or was made for another place of the eye.
     """
     layout = folder.stage.layout
-    pages = [quilt_path(folder.path, page + 1, frame) for page in range(len(layout.pages))]
-    eye = views_at(folder.stage.job, frame)[0].viewer.eye
+    view = views_at(folder.stage.job, frame)[0]  # of two eyes the left
+    pages = [quilt_path(folder.path, page + 1, *view.file_key) for page in range(len(layout.pages))]
+    eye = view.viewer.eye
     lit = lit_facets(folder.stage.facets, eye) & (layout.page >= 0)  # a render may leave the others out
-    facets = [facet_path(folder.path, facet, frame) for facet in layout.facet[lit].tolist()]
+    facets = [facet_path(folder.path, facet, *view.file_key) for facet in layout.facet[lit].tolist()]
     found = [paths for paths in (pages, facets) if paths and paths[0].is_file()]
     if not found:
         wrong = f"has no images of frame {frame} (it has {format_frames(folder.frames)})"

@@ -206,6 +206,16 @@ def read_exr(path: Path, part: str = "") -> Image:
     return parts[0]
 
 
+def part_names(path: Path) -> tuple[str, ...]:
+    """Names of the parts of a file, empty for one that has none; errors as for `read_parts`."""
+    return tuple(header.get("name", "") for header in _read_headers(path))
+
+
+def read_first(path: Path) -> Image:
+    """The first part of a file, whatever others there are: the left eye's; errors as for `read_parts`."""
+    return read_parts(path)[0]
+
+
 def read_header(path: Path) -> Image:
     """Everything of the first part but its pixels (`channels` is empty); errors as for `read_parts`."""
     return _image(_read_headers(path)[0], {})

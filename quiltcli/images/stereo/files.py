@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
-from quiltcli.formats.exr.image import Image, read_exr, write_exr
+from quiltcli.formats.exr.image import Image, part_names, read_exr, write_exr
 from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import Float32Array
 from quiltcli.images.names import frame_digits, name_of
@@ -97,7 +97,7 @@ def find_pairs(out: Path, options: StereoOptions) -> list[Pair]:
         name = name_of(path)
         if name is None or (options.frames is not None and name.frame not in options.frames):
             continue
-        eyes = (name.eye,) if name.eye else EYES
+        eyes = (name.eye,) if name.eye else [part for part in part_names(path) if part in EYES]
         for eye in eyes:
             found.setdefault((name.number, name.frame), {})[eye] = (path, "" if name.eye else eye)
     missing = sorted({frame for (_, frame), eyes in found.items() if set(eyes) != set(EYES)})
@@ -105,7 +105,8 @@ def find_pairs(out: Path, options: StereoOptions) -> list[Pair]:
         words = f"frames {format_frames(missing)} have {kind}s of one eye only"
         raise OutputError(Problem(words, file=str(out)))
     if not found:
-        words = f"has no {kind}s of two eyes (expected the folder of a job with viewer.stereo)"
+        of = f" at frames {format_frames(options.frames)}" if options.frames else ""
+        words = f"has no {kind}s of two eyes{of} (expected what a job with viewer.stereo has rendered)"
         raise OutputError(Problem(words, file=str(out)))
     order = ("right", "left") if options.swap else EYES
     return [Pair(*key, (found[key][order[0]], found[key][order[1]])) for key in sorted(found)]
