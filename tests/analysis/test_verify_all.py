@@ -19,6 +19,7 @@ from quiltcli.display import Facets, lit_facets, load_display
 from quiltcli.geometry import FloatArray, IntArray, dot
 from quiltcli.job import load_display_file, load_job, load_scene_file
 from quiltcli.scene import load_scene
+from tests.helpers.verified_jobs import found
 
 pytestmark = pytest.mark.long
 
@@ -110,8 +111,8 @@ def hold(name: str, facets: Facets, scene: Path, eye: FloatArray, folder: Path) 
         f"    - {{frame: 1, position: {eye.tolist()}, look_at: {at.tolist()}}}\n"
         f"render: {{depth: {'radial' if surround else 'planar'}}}\n"
     )
-    [found] = verify(load_job(folder / "job.yaml"), VerifyOptions(pixels=SAMPLE))
-    verdict = found.verdict
+    [verified] = verify(load_job(folder / "job.yaml"), VerifyOptions(pixels=SAMPLE))
+    verdict = verified.verdict
     assert found(verdict) == {}, verdict.faults[:5]
     assert verdict.lit >= 1
     assert verdict.inside["pixels"] > SAMPLE // 2
