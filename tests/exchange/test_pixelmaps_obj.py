@@ -107,6 +107,14 @@ def test_a_mesh_that_does_not_say_enough(tmp_path):
     assert str(caught.value) == f"{path}: the mesh has no texture coordinates, which a layout is read from"
 
 
+@pytest.mark.parametrize("u", ["1e308", "-1e308", "1e400"])
+def test_texture_coordinates_that_are_no_place_on_a_page(tmp_path, u):
+    path = tmp_path / "m.obj"
+    path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt {u} 0\nvt 0 1\nf 1/1 2/2 3/3\n")
+    with pytest.raises(LayoutError, match="no texture coordinate, or one that is not finite"):
+        read_map(path, size=(100, 100))
+
+
 def test_a_mesh_with_a_facet_twice(tmp_path):
     facets, layout = turned()
     write_map(layout, facets, tmp_path / "m.obj")

@@ -117,6 +117,13 @@ def test_quadrilaterals_are_cut_as_ears_would() -> None:
             )
 
 
+@pytest.mark.parametrize("size", [1e-300, 1e-160, 1e155, 1e200, 1e305])
+def test_polygons_of_any_size_are_cut(size: float) -> None:
+    points = np.array([*DART, *DART, *DART], float) * size
+    with np.errstate(all="ignore"):
+        assert len(triangulate(points, starts(len(points))).face) <= len(points) - 2
+
+
 def test_planes_may_lie_anywhere() -> None:
     flat = np.array([(x, y, 0.0) for x, y in WINDOW])
     corners = flat @ rotation_deg((30, 50, 70)).T * 0.01 + (100, -20, 3)

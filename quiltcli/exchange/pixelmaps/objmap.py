@@ -104,7 +104,8 @@ class _Faces:
         if self.mesh.uv is None:
             return np.full((len(self.mesh.corners), 2), np.nan)
         flipped = np.stack((self.mesh.uv[:, 0], 1 - self.mesh.uv[:, 1]), axis=1)
-        return np.asarray(flipped * size)
+        with np.errstate(over="ignore"):  # what is no number of pixels is named with its facet
+            return np.asarray(flipped * size)
 
     def taken(self, order: Sequence[int]) -> _Faces:
         """These faces only, in this order."""

@@ -99,7 +99,7 @@ class _Clipper:
         self._waiting: dict[int, list[int]] = {}
         size = float(np.abs(points - points[0]).max())
         self._area = size * size * STRAIGHT
-        self._near = (size * STRAIGHT) ** 2
+        self._near = size * STRAIGHT * (size * STRAIGHT)  # infinite where ** would raise
         # Corners by x: only those in an ear's range of x can lie in it.
         self._order = np.argsort(points[:, 0], kind="stable")
         self._x, self._y = points[self._order].T
