@@ -31,14 +31,17 @@ sys.argv[1:] = ["render", "job.yaml"]
 quiltcli.__main__.run()
 """
 
-# A render with worker processes that says when it draws a frame, and takes its time over it.
+# A render with worker processes that says when it draws a frame, and takes its time over it. It sleeps in short
+# pieces: Python answers a signal that comes just before a long sleep only after it, and two of them as one.
 DRAWING = """
 import time
 from quiltcli.render import sequence
 draw = sequence.draw_view
 def slow(stage, view, *rest, **how):
     print("drawing", view.frame, flush=True)
-    time.sleep(0.5)
+    end = time.monotonic() + 0.5
+    while time.monotonic() < end:
+        time.sleep(0.01)
     return draw(stage, view, *rest, **how)
 sequence.draw_view = slow
 sequence.worth_forking = lambda stage: True
