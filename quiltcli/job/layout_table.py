@@ -12,9 +12,9 @@ import hashlib
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,65 +33,24 @@ _NUMBERS = re.compile(r"[-+0-9eE., \[\]]*")
 _MOST_PIXELS = 1_000_000
 
 
-class Places(Protocol):
-    """Columns that say where facets lie; rows whose page is negative lie nowhere."""
-
-    @property
-    def facet(self) -> Int32Array:
-        """Ids (F,), from 1 on."""
-
-    @property
-    def page(self) -> Int32Array:
-        """Pages (F,), from 0 on."""
-
-    @property
-    def size(self) -> Int32Array:
-        """Rasters' width and height (F, 2), pixels."""
-
-    @property
-    def quilt_from_facet(self) -> FloatArray:
-        """Maps (F, 2, 3) from facet pixels to page pixels."""
-
-    @property
-    def origin(self) -> FloatArray:
-        """World positions (F, 3) of the rasters' top-left corners."""
-
-    @property
-    def du(self) -> FloatArray:
-        """World steps (F, 3) to the next pixel right."""
-
-    @property
-    def dv(self) -> FloatArray:
-        """World steps (F, 3) to the next pixel down."""
-
-    @property
-    def corner_start(self) -> IntArray:
-        """Offsets (F+1,) into `polygon`."""
-
-    @property
-    def polygon(self) -> FloatArray:
-        """Corners (C, 2) in facet pixels."""
-
-    @property
-    def pages(self) -> Int32Array:
-        """Pages' width and height (G, 2), pixels."""
-
-    @property
-    def padding(self) -> int:
-        """Pixels between facets."""
-
-
-@dataclass(frozen=True)
-class LayoutTable:
-    """A validated layout file; the columns are those of `Places`, in the order of the file.
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where F facets lie on the pages of a quilt.
 
     Attributes:
-        head: the file's other keys; of its facets it may have the first alone.
-        source: finds lines in the file.
+        facet: (F,) facet ids, 1-based.
+        page: (F,) 0-based page, −1 for a facet that has no place in the quilt.
+        size: (F, 2) facet raster width and height, pixels.
+        quilt_from_facet: (F, 2, 3) affine maps from facet pixels to pixels of the page.
+        origin: (F, 3) world position of the raster's top-left corner, metres.
+        du: (F, 3) world step to the next facet pixel right, metres.
+        dv: (F, 3) world step to the next facet pixel down, metres.
+        corner_start: (F+1,) offsets into `polygon`.
+        polygon: (C, 2) corners in facet pixels.
+        pages: (G, 2) page width and height, pixels.
+        padding: pixels kept free between facets.
     """
 
-    head: LayoutFile
-    source: Source | LayoutLines
     facet: Int32Array
     page: Int32Array
     size: Int32Array
@@ -103,6 +62,36 @@ class LayoutTable:
     polygon: FloatArray
     pages: Int32Array
     padding: int
+
+    def taken(self, rows: IntArray) -> Self:
+        """Some of the facets, in this order, on the same pages."""
+        start = np.concatenate(([0], np.cumsum(np.diff(self.corner_start)[rows])))
+        row, rank = segments(start)
+        return replace(
+            self,
+            facet=self.facet[rows],
+            page=self.page[rows],
+            size=self.size[rows],
+            quilt_from_facet=self.quilt_from_facet[rows],
+            origin=self.origin[rows],
+            du=self.du[rows],
+            dv=self.dv[rows],
+            corner_start=start,
+            polygon=self.polygon[self.corner_start[rows][row] + rank],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LayoutTable(Places):
+    """A validated layout file; the facets in the order of the file.
+
+    Attributes:
+        head: the file's other keys; of its facets it may have the first alone.
+        source: finds lines in the file.
+    """
+
+    head: LayoutFile
+    source: Source | LayoutLines
 
 
 @dataclass(frozen=True)
@@ -134,16 +123,12 @@ def places_sha256(places: Places) -> str:
     """Hash of where facets lie, hexadecimal: pages, rasters, maps and outlines of all that have a page."""
     digest = hashlib.sha256(b"quilt places 1")
     rows = np.flatnonzero(places.page >= 0)
-    rows = rows[np.argsort(places.facet[rows], kind="stable")]
-    counts = np.diff(places.corner_start)[rows]
-    columns = (places.facet, places.page, places.size)
-    for whole in (places.pages, places.padding, counts, *(column[rows] for column in columns)):
+    placed = places.taken(rows[np.argsort(places.facet[rows], kind="stable")])
+    counts = np.diff(placed.corner_start)
+    for whole in (placed.pages, placed.padding, counts, placed.facet, placed.page, placed.size):
         digest.update(np.ascontiguousarray(whole, dtype="<i8").tobytes())
-    for exact in (places.quilt_from_facet, places.origin, places.du, places.dv):
-        digest.update(np.ascontiguousarray(exact[rows], dtype="<f8").tobytes())
-    row, rank = segments(np.concatenate(([0], np.cumsum(counts))))
-    corners = places.polygon[places.corner_start[rows][row] + rank]
-    digest.update(np.ascontiguousarray(corners, dtype="<f8").tobytes())
+    for exact in (placed.quilt_from_facet, placed.origin, placed.du, placed.dv, placed.polygon):
+        digest.update(np.ascontiguousarray(exact, dtype="<f8").tobytes())
     return digest.hexdigest()
 
 

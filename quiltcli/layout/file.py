@@ -14,8 +14,7 @@ from pydantic import ValidationError
 from quiltcli.errors import Problem
 from quiltcli.formats.whole import write_text
 from quiltcli.formats.yaml.source import Source
-from quiltcli.geometry import segments
-from quiltcli.job.layout_table import LayoutTable, read_layout_table
+from quiltcli.job.layout_table import LayoutTable, Places, read_layout_table
 from quiltcli.layout.check import check_layout
 from quiltcli.layout.layout import Layout, Packed
 
@@ -36,20 +35,9 @@ def layout_from_table(table: LayoutTable) -> Layout:
     """The record of a layout file, facets sorted by id."""
     head = table.head
     order = np.argsort(table.facet, kind="stable")
-    counts = np.diff(table.corner_start)[order]
-    row, rank = segments(np.concatenate(([0], np.cumsum(counts))))
+    places = table.taken(order)
     return Layout(
-        facet=table.facet[order],
-        page=table.page[order],
-        size=table.size[order],
-        quilt_from_facet=table.quilt_from_facet[order],
-        origin=table.origin[order],
-        du=table.du[order],
-        dv=table.dv[order],
-        corner_start=np.concatenate(([0], np.cumsum(counts))),
-        polygon=table.polygon[table.corner_start[order][row] + rank],
-        pages=table.pages,
-        padding=table.padding,
+        **{column.name: getattr(places, column.name) for column in fields(Places)},
         method=head.method,
         display=os.path.normpath(head.display) if head.display else "",
         display_sha256=head.display_sha256 or "",

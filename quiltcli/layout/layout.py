@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
+from typing import Protocol, Self
 
 import numpy as np
 
 from quiltcli.errors import Problem
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, segments
+from quiltcli.job.layout_table import Places
 
 PIXEL_TOLERANCE = 0.01
 """Pixels by which corners may miss: texture coordinates of six digits, on an 8192 canvas, miss by this."""
@@ -32,24 +33,13 @@ class Packed:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """Places of F facets on the pages of a quilt.
+class Layout(Places):
+    """Places of F facets, by ascending id, on the pages of a quilt.
 
     All pages lie in one flat pixel address space: pixel (x, y) of page g has the address
     `page_offset[g] + y·W + x`.
 
     Attributes:
-        facet: (F,) facet ids, 1-based, ascending.
-        page: (F,) 0-based page, −1 for a facet that has no place in the quilt.
-        size: (F, 2) facet raster width and height, pixels.
-        quilt_from_facet: (F, 2, 3) affine maps from facet pixels to pixels of the page.
-        origin: (F, 3) world position of the raster's top-left corner, metres.
-        du: (F, 3) world step to the next facet pixel right, metres.
-        dv: (F, 3) world step to the next facet pixel down, metres.
-        corner_start: (F+1,) offsets into `polygon`.
-        polygon: (C, 2) corners in facet pixels.
-        pages: (G, 2) page width and height, pixels.
-        padding: pixels kept free between facets.
         method: name of the packing method, `manual` when made by hand.
         display: the display file the layout was made for.
         display_sha256: hash of that display's geometry.
@@ -59,17 +49,6 @@ class Layout:
         file_row: (F,) row of each facet in the file, None when it was made by the program.
     """
 
-    facet: Int32Array
-    page: Int32Array
-    size: Int32Array
-    quilt_from_facet: FloatArray
-    origin: FloatArray
-    du: FloatArray
-    dv: FloatArray
-    corner_start: IntArray
-    polygon: FloatArray
-    pages: Int32Array
-    padding: int
     method: str
     display: str
     display_sha256: str
@@ -83,6 +62,11 @@ class Layout:
         """Flat address (G+1,) of every page's first pixel; the last entry is the pixel count."""
         pixels = self.pages[:, 0].astype(np.int64) * self.pages[:, 1]
         return np.concatenate(([0], np.cumsum(pixels)))
+
+    def taken(self, rows: IntArray) -> Self:
+        """Some of the facets, in this order, on the same pages."""
+        kept = super().taken(rows)
+        return kept if self.file_row is None else replace(kept, file_row=self.file_row[rows])
 
     def problem(self, message: str, row: int = -1, key: str = "") -> Problem:
         """A problem with this layout, told with the line it stands on when that is known.

@@ -31,8 +31,8 @@ sys.argv[1:] = ["render", "job.yaml"]
 quiltcli.__main__.run()
 """
 
-# A render with worker processes that says when it draws a frame, and takes its time over it. It sleeps in short
-# pieces: Python answers a signal that comes just before a long sleep only after it, and two of them as one.
+# A render with worker processes that says when it draws a frame, and takes its time over it, in short pieces:
+# Python answers a signal that comes just before a long sleep only after it, and two of them as one.
 DRAWING = """
 import time
 from quiltcli.render import sequence

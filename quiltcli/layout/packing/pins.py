@@ -97,7 +97,7 @@ def pinned(pins: Layout, facets: Facets) -> Layout:
     """
     raise_all(LayoutError, _unknown(pins, facets))
     keep = (pins.page >= 0) & facets.enabled[pins.facet - 1]
-    kept = rows_of(pins, np.flatnonzero(keep))
+    kept = pins.taken(np.flatnonzero(keep))
     raise_all(LayoutError, misfits(kept, facets))
     return kept
 
@@ -107,26 +107,6 @@ def _unknown(pins: Layout, facets: Facets) -> Iterator[Problem]:
         if facet > facets.count:
             message = f"facet {facet} is not in {facets.path}, which has facets 1 to {facets.count}"
             yield pins.problem(message, row, "id")
-
-
-def rows_of(layout: Layout, rows: IntArray) -> Layout:
-    """A layout of some rows of another, in this order, on the same pages."""
-    counts = np.diff(layout.corner_start)[rows]
-    corners = [np.arange(layout.corner_start[row], layout.corner_start[row + 1]) for row in rows]
-    corner = np.concatenate([np.zeros(0, dtype=np.int64), *corners])
-    return replace(
-        layout,
-        facet=layout.facet[rows],
-        page=layout.page[rows],
-        size=layout.size[rows],
-        quilt_from_facet=layout.quilt_from_facet[rows],
-        origin=layout.origin[rows],
-        du=layout.du[rows],
-        dv=layout.dv[rows],
-        corner_start=np.concatenate(([0], np.cumsum(counts))),
-        polygon=layout.polygon[corner],
-        file_row=None if layout.file_row is None else layout.file_row[rows],
-    )
 
 
 def joined(pins: Layout, rest: Layout) -> Layout:
@@ -147,7 +127,7 @@ def joined(pins: Layout, rest: Layout) -> Layout:
         place=None,
         file_row=None,
     )
-    return rows_of(both, np.argsort(both.facet, kind="stable"))
+    return both.taken(np.argsort(both.facet, kind="stable"))
 
 
 def free_rooms(pins: Layout, padding: int, align: int, smallest: int) -> tuple[Room, ...]:
