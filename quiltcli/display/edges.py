@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.display.weld import tolerance, weld
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, next_in_row, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, next_in_row, offsets, segments
 
 _PAIRS_AT_ONCE = 2_000_000
 
@@ -124,7 +124,7 @@ def _points_on(points: FloatArray, ends: IntArray, close: float) -> tuple[IntArr
     while first < len(ends):
         done = total[first - 1] if first else 0
         last = max(first + 1, int(np.searchsorted(total, done + _PAIRS_AT_ONCE, side="right")))
-        edge, rank = segments(np.concatenate(([0], np.cumsum(count[first:last]))))
+        edge, rank = segments(offsets(count[first:last]))
         edge = edge + first
         point = order[begin[edge] + rank]
         on = _inside(points[ends[edge, 0]], points[ends[edge, 1]], points[point], close)

@@ -12,7 +12,16 @@ from quiltcli.display.edges import SharedEdges, find_shared_edges
 from quiltcli.errors import Problem
 from quiltcli.formats.mesh import polygons
 from quiltcli.formats.yaml.source import Source
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, facet_from_world, segments
+from quiltcli.geometry import (
+    BoolArray,
+    FloatArray,
+    Int32Array,
+    IntArray,
+    dot,
+    facet_from_world,
+    offsets,
+    segments,
+)
 from quiltcli.job.display import PlaceOnPage
 
 
@@ -178,7 +187,7 @@ def convex_parts(facets: Facets) -> tuple[Int32Array, IntArray, Int32Array]:
     facet = np.concatenate((np.flatnonzero(whole), owner[cut]))
     order = np.argsort(facet, kind="stable")
     count = np.where(whole[facet], np.diff(start)[facet], 3)[order]
-    part_start = np.concatenate((np.zeros(1, np.int64), np.cumsum(count)))
+    part_start = offsets(count)
     pool = np.concatenate((np.arange(start[-1]), triangles[cut].reshape(-1)))
     begin = np.concatenate((start[:-1][whole], start[-1] + 3 * np.arange(cut.sum())))[order]
     part, rank = segments(part_start)

@@ -8,7 +8,7 @@ import numpy as np
 
 from quiltcli.display.check import called
 from quiltcli.display.facets import Facets, pitch_mm, shared_edges
-from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, next_in_row, segments
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, next_in_row, offsets, segments
 
 _WIDEST = 200.0  # metres; the largest screens are half as wide
 _MOST_PAIRS = 5
@@ -67,7 +67,7 @@ def disagreeing(facets: Facets) -> list[tuple[int, int]]:
 def _ways(facets: Facets, facet: IntArray, start: FloatArray, end: FloatArray, step: FloatArray) -> BoolArray:
     """Whether each facet's outline runs along a piece (E,) of its edges from its start to its end."""
     first = facets.corner_start[facet]
-    row, rank = segments(np.concatenate(([0], np.cumsum(facets.corner_start[facet + 1] - first))))
+    row, rank = segments(offsets(facets.corner_start[facet + 1] - first))
     a = first[row] + rank
     b = next_in_row(facets.corner_start)[a]
     edge = facets.corners[b] - facets.corners[a]

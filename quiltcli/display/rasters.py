@@ -12,7 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot, normalized, segments
+from quiltcli.geometry import (
+    BoolArray,
+    FloatArray,
+    Int32Array,
+    IntArray,
+    cross,
+    dot,
+    normalized,
+    offsets,
+    segments,
+)
 
 MOST_PIXELS = 65536  # a side
 LEVEL = math.sin(math.radians(1))
@@ -105,16 +115,14 @@ def _rectangle_areas(corners: FloatArray, start: IntArray, edge: FloatArray, sid
     while begin < len(row):
         done = total[begin - 1] if begin else 0
         end = max(begin + 1, int(np.searchsorted(total, done + _PAIRS_AT_ONCE, side="right")))
-        offsets = np.concatenate(([0], np.cumsum(count[begin:end])))
-        which, rank = segments(offsets)
+        own = offsets(count[begin:end])
+        which, rank = segments(own)
         facet = row[begin:end][which]
         local = corners[start[facet] + rank] - corners[start[facet]]
         extent = np.ones(end - begin)
         for axis in (edge[begin:end], side[begin:end]):
             along = dot(local, axis[which])
-            extent = extent * (
-                np.maximum.reduceat(along, offsets[:-1]) - np.minimum.reduceat(along, offsets[:-1])
-            )
+            extent = extent * (np.maximum.reduceat(along, own[:-1]) - np.minimum.reduceat(along, own[:-1]))
         area[begin:end] = extent
         begin = end
     return area

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,18 @@ def slices(first: int, last: int, step: int) -> Iterator[slice]:
     """Consecutive slices of at most `step` from `first` to `last`."""
     for at in range(first, last, step):
         yield slice(at, min(at + step, last))
+
+
+def offsets(counts: Sequence[int] | NDArray[np.integer[Any] | np.bool_]) -> IntArray:
+    """Offsets (n+1,) of the rows of a ragged array from their lengths (n,)."""
+    return np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))
+
+
+def some_rows(start: IntArray, rows: IntArray) -> tuple[IntArray, IntArray]:
+    """Some rows of a ragged array alone: their offsets (m+1,), and where in it their elements are (C,)."""
+    own = offsets(np.diff(start)[rows])
+    row, rank = segments(own)
+    return own, start[rows][row] + rank
 
 
 def segments(start: IntArray) -> tuple[IntArray, IntArray]:

@@ -21,7 +21,7 @@ import numpy as np
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.yaml.source import Source, parse_text
 from quiltcli.formats.yaml.syntax import read_text
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, some_rows
 from quiltcli.job.layout import LayoutFile
 from quiltcli.job.load import layout_of, load_layout_file
 
@@ -65,8 +65,7 @@ class Places:
 
     def taken(self, rows: IntArray) -> Self:
         """Some of the facets, in this order, on the same pages."""
-        start = np.concatenate(([0], np.cumsum(np.diff(self.corner_start)[rows])))
-        row, rank = segments(start)
+        start, corners = some_rows(self.corner_start, rows)
         return replace(
             self,
             facet=self.facet[rows],
@@ -77,7 +76,7 @@ class Places:
             du=self.du[rows],
             dv=self.dv[rows],
             corner_start=start,
-            polygon=self.polygon[self.corner_start[rows][row] + rank],
+            polygon=self.polygon[corners],
         )
 
 

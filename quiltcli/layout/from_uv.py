@@ -8,7 +8,7 @@ import numpy as np
 
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import FloatArray, Int32Array
+from quiltcli.geometry import FloatArray, Int32Array, offsets
 from quiltcli.layout.check import check_layout
 from quiltcli.layout.layout import PIXEL_TOLERANCE, Layout
 
@@ -83,7 +83,7 @@ def layout_from_polygons(
         origin=np.array([fit.origin for fit in fits]).reshape(-1, 3),
         du=np.array([fit.du for fit in fits]).reshape(-1, 3),
         dv=np.array([fit.dv for fit in fits]).reshape(-1, 3),
-        corner_start=np.concatenate(([0], np.cumsum(count))),
+        corner_start=offsets(count),
         polygon=np.concatenate([np.zeros((0, 2)), *(fit.polygon for fit in fits)]),
         pages=pages.astype(np.int32),
         padding=padding,

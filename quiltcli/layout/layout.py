@@ -9,7 +9,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from quiltcli.errors import Problem
-from quiltcli.geometry import BoolArray, FloatArray, IntArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, offsets, segments
 from quiltcli.job.layout_table import Places
 
 PIXEL_TOLERANCE = 0.01
@@ -61,7 +61,7 @@ class Layout(Places):
     def page_offset(self) -> IntArray:
         """Flat address (G+1,) of every page's first pixel; the last entry is the pixel count."""
         pixels = self.pages[:, 0].astype(np.int64) * self.pages[:, 1]
-        return np.concatenate(([0], np.cumsum(pixels)))
+        return offsets(pixels)
 
     def taken(self, rows: IntArray) -> Self:
         """Some of the facets, in this order, on the same pages."""

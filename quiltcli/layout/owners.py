@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import LayoutError
 from quiltcli.formats.capacity import bytes_text, free_memory
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, offsets, segments
 from quiltcli.layout.layout import Layout, quilt_polygons
 from quiltcli.layout.spans import Spans, facet_spans, overlaps, snapped
 
@@ -118,7 +118,7 @@ def _candidates(
     a, b, page = edges.a[batch], edges.b[batch], edges.page[batch]
     top = np.clip(np.ceil(np.minimum(a[:, 1], b[:, 1]) - bleed - 0.5), 0, page[:, 1])
     bottom = np.clip(np.floor(np.maximum(a[:, 1], b[:, 1]) + bleed - 0.5) + 1, top, page[:, 1])
-    edge, rank = segments(np.concatenate(([0], np.cumsum((bottom - top).astype(np.int64)))))
+    edge, rank = segments(offsets((bottom - top).astype(np.int64)))
     y: FloatArray = top[edge] + rank
     left, right = _reach(a[edge], b[edge], y + 0.5, bleed, page[edge, 0])
     counts = (right - left).astype(np.int64)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, offsets, segments
 from quiltcli.layout.layout import Layout, quilt_polygons
 
 _GRID = 2.0**20
@@ -65,7 +65,7 @@ def facet_spans(layout: Layout) -> Spans:
     first = np.clip(np.ceil(upper[:, 1] - 0.5), 0, height).astype(np.int64)
     last = np.clip(np.ceil(lower[:, 1] - 0.5), 0, height).astype(np.int64)
     last = np.where(layout.page[row] < 0, first, last)
-    edge, rank = segments(np.concatenate(([0], np.cumsum(last - first))))
+    edge, rank = segments(offsets(last - first))
     y = first[edge] + rank
     x = np.clip(_crossings(upper, lower, edge, y), 0, width[edge]).astype(np.int64)
     address = layout.page_offset[page[edge]] + y * width[edge]
@@ -93,7 +93,7 @@ def overlaps(spans: Spans) -> list[Overlap]:
     Among runs sorted by their start, those that begin before run i ends follow i directly.
     """
     reach = np.searchsorted(spans.start, spans.stop) - np.arange(spans.start.size) - 1
-    i, rank = segments(np.concatenate(([0], np.cumsum(reach))))
+    i, rank = segments(offsets(reach))
     j = i + 1 + rank
     low, high = np.minimum(spans.row[i], spans.row[j]), np.maximum(spans.row[i], spans.row[j])
     first = spans.start[j]

@@ -13,7 +13,16 @@ from functools import cached_property
 import numpy as np
 
 from quiltcli.display import Facets, shared_edges
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, OwnerArray, segments
+from quiltcli.geometry import (
+    BoolArray,
+    Float32Array,
+    FloatArray,
+    Int32Array,
+    IntArray,
+    OwnerArray,
+    offsets,
+    segments,
+)
 from quiltcli.layout import Layout
 from quiltcli.projection.planar import QuiltRays, quilt_rays
 from quiltcli.render.buffers import Buffers
@@ -51,7 +60,7 @@ class Shown:
         pairs = np.concatenate((pairs, pairs[:, ::-1]))[np.tile(self.lit[pairs].all(axis=1), 2)]
         pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
         count = np.bincount(pairs[:, 0], minlength=self.facets.count)
-        _, rank = segments(np.concatenate(([0], np.cumsum(count))))
+        _, rank = segments(offsets(count))
         result = np.full((self.facets.count, int(count.max(initial=0))), -1)
         result[pairs[:, 0], rank] = pairs[:, 1]
         return result

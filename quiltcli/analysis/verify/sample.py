@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, IntArray, OwnerArray, segments
+from quiltcli.geometry import BoolArray, IntArray, OwnerArray, offsets, segments
 from quiltcli.layout import Layout, facet_spans
 
 _BLOCK = 1 << 16
@@ -89,7 +89,7 @@ def _inside(
     area = np.add.reduceat(length, first)
     share = 0.5 / area.size + 0.5 * area / area.sum()
     quota = np.minimum(np.ceil(share * count).astype(np.int64), area)
-    facet, step = segments(np.concatenate(([0], np.cumsum(quota))))
+    facet, step = segments(offsets(quota))
     # One pixel in each of `quota` equal stretches of the facet's pixels: no pixel comes twice.
     place = (step + random.random(facet.size)) * (area / quota)[facet]
     rank = cumulative[first][facet] + np.minimum(place.astype(np.int64), area[facet] - 1)

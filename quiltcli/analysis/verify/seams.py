@@ -17,7 +17,7 @@ from quiltcli.analysis.verify.pixels import Sighting, Trial, sight
 from quiltcli.analysis.verify.tally import MOST_FAULTS, Fault
 from quiltcli.analysis.verify.tolerances import depth_tolerance
 from quiltcli.display import SharedEdges
-from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, normalized, segments
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, normalized, offsets, segments
 from quiltcli.visibility.rays.embree import Target, measure_along
 
 _ACROSS = 0.05  # depth gained along a unit ray
@@ -84,7 +84,7 @@ def seam_points(trial: Trial, edges: SharedEdges, most: int) -> SeamPoints:
     with np.errstate(invalid="ignore"):
         length = np.hypot(*(ends[1] - ends[0]).T)
     counts = np.clip(np.ceil(np.nan_to_num(length)), 1, most).astype(np.int64)
-    edge, rank = segments(np.concatenate(([0], np.cumsum(counts))))
+    edge, rank = segments(offsets(counts))
     share = ((rank + 0.5) / counts[edge])[:, None]
     direction = start[edge] + share * (end - start)[edge]
     pixel = np.stack([_nearest_pixel(trial, side[edge].astype(np.int64), direction) for side in facets])

@@ -22,7 +22,7 @@ from quiltcli.formats.inputs import open_input
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
 from quiltcli.formats.whole import write_text
 from quiltcli.formats.yaml.source import Source
-from quiltcli.geometry import FloatArray, IntArray, cross, dot
+from quiltcli.geometry import FloatArray, IntArray, cross, dot, offsets, some_rows
 from quiltcli.job import DisplayFile, ResolutionSpec
 from quiltcli.job.model import attach
 from quiltcli.layout import Layout, quilt_polygons
@@ -109,12 +109,10 @@ class _Faces:
 
     def taken(self, order: Sequence[int]) -> _Faces:
         """These faces only, in this order."""
-        start = self.mesh.corner_start
-        corners = [np.arange(start[face], start[face + 1]) for face in order]
-        pick = np.concatenate([np.zeros(0, np.int64), *corners])
+        start, pick = some_rows(self.mesh.corner_start, np.array(order, dtype=np.int64))
         mesh = replace(
             self.mesh,
-            corner_start=np.cumsum([0, *map(len, corners)]),
+            corner_start=start,
             corners=self.mesh.corners[pick],
             uv=None if self.mesh.uv is None else self.mesh.uv[pick],
             names=tuple(self.mesh.names[face] for face in order),
@@ -188,7 +186,7 @@ def _joined(meshes: Sequence[PolygonMesh], path: Path) -> PolygonMesh:
     uvs = [np.full((len(m.corners), 2), np.nan) if m.uv is None else m.uv for m in meshes]
     return PolygonMesh(
         vertices=np.concatenate([mesh.vertices for mesh in meshes]),
-        corner_start=np.concatenate(([0], np.cumsum(count))),
+        corner_start=offsets(count),
         corners=np.concatenate([mesh.corners + at for mesh, at in zip(meshes, first, strict=False)]),
         uv=np.concatenate(uvs),
         names=tuple(name for mesh in meshes for name in mesh.names),

@@ -27,10 +27,9 @@ from quiltcli.formats.mesh.words import (
     parsed_floats,
     parsed_integers,
     plain_text,
-    ragged,
     statements,
 )
-from quiltcli.geometry import Float32Array, FloatArray, IntArray, segments
+from quiltcli.geometry import Float32Array, FloatArray, IntArray, offsets, segments
 
 _CORNER = re.compile(r"[-+]?\d+(/([-+]?\d+)?){0,2}", re.ASCII)
 _SLASH, _BLANK = 47, 32
@@ -158,7 +157,7 @@ def _numbers(file: _File, rows: IntArray, need: int) -> tuple[FloatArray, IntArr
 
     The first `need` words must be numbers; whatever else is not a number ends its row.
     """
-    start = ragged(file.text.sizes[rows] - 1)
+    start = offsets(file.text.sizes[rows] - 1)
     flat = parsed_floats(file.text.spans(rows, 1), int(start[-1]))
     if flat is not None:
         return flat, start
@@ -167,7 +166,7 @@ def _numbers(file: _File, rows: IntArray, need: int) -> tuple[FloatArray, IntArr
     kept = [list(_leading(file.text.words(row)[1:])) for row in rows.tolist()]
     if file.problems:  # not to call a row of words too short as well
         kept = [(row + [0.0] * 3)[: max(len(row), 3)] for row in kept]
-    return np.array([n for row in kept for n in row], np.float64), ragged(np.array([len(r) for r in kept]))
+    return np.array([n for row in kept for n in row], np.float64), offsets(np.array([len(r) for r in kept]))
 
 
 def _leading(words: list[str]) -> Iterator[float]:
@@ -182,7 +181,7 @@ def _corners(file: _File, places: Mapping[str, IntArray]) -> _Corners:
     """`f a b c …`, a corner being `v`, `v/vt`, `v//vn` or `v/vt/vn`, negative counting back."""
     text = file.text
     rows = np.sort(np.concatenate((text.led_by(b"f"), text.led_by(b"fo"))))
-    start = ragged(text.sizes[rows] - 1)
+    start = offsets(text.sizes[rows] - 1)
     row, rank = segments(start)
     word = text.first[rows][row] + 1 + rank
     fields = _fields(file, rows, word)
@@ -225,7 +224,7 @@ def _fields(file: _File, rows: IntArray, word: IntArray) -> IntArray | None:
     per_word = np.bincount(owner, minlength=len(word))
     if per_word.max() > 2 or (text.letters[text.start[word]] == _SLASH).any():
         return None
-    field_of = np.arange(len(owner)) - ragged(per_word)[owner] + 1
+    field_of = np.arange(len(owner)) - offsets(per_word)[owner] + 1
     behind = text.letters[slashes + 1]
     filled = (behind != _SLASH) & (behind > _BLANK)
     count = int(np.count_nonzero(filled))
@@ -234,7 +233,7 @@ def _fields(file: _File, rows: IntArray, word: IntArray) -> IntArray | None:
         return None
     fields = np.zeros((len(word), 3), np.int64)
     # A word's first number comes after all numbers of the words before it.
-    filled_before = ragged(np.bincount(owner[filled], minlength=len(word)))
+    filled_before = offsets(np.bincount(owner[filled], minlength=len(word)))
     fields[:, 0] = numbers[np.arange(len(word)) + filled_before[:-1]]
     fields[owner[filled], field_of[filled]] = numbers[owner[filled] + 1 + np.arange(count)]
     return fields

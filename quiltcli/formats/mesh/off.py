@@ -22,10 +22,9 @@ from quiltcli.formats.mesh.words import (
     blanked,
     parsed_floats,
     plain_text,
-    ragged,
     statements,
 )
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, segments
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, offsets, segments
 
 _HEADER = re.compile(r"(ST)?(C)?(N)?OFF(\d+)?")
 _MOST_DIGITS = 18
@@ -171,7 +170,7 @@ def _by_lines(text: Statements, header: _Header, path: str) -> tuple[_Rows, _Row
 
 def _lines_of(text: Statements, row: int, count: int, what: str, path: str) -> _Rows:
     rows = np.arange(row, min(row + count, text.count))
-    start = ragged(text.sizes[rows])
+    start = offsets(text.sizes[rows])
     flat = parsed_floats(text.spans(rows, 0), int(start[-1]))
     if flat is None:
         name = {"vertices": "vertex", "faces": "face"}[what]
@@ -213,7 +212,7 @@ def _loose(text: Statements, header: _Header) -> tuple[_Rows, _Rows] | None:
 def _corners(text: Statements, faces: _Rows, header: _Header, path: str) -> tuple[IntArray, IntArray]:
     """Offsets (F+1,) and vertex numbers (C,) of the faces."""
     size = faces.flat[faces.start[:-1]].astype(np.int64)
-    start = ragged(size)
+    start = offsets(size)
     row, rank = segments(start)
     place = faces.start[row] + 1 + rank
     named = faces.flat[place]

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.formats.mesh.ply_header import ElementHeader, Header, Property, StopReadingError
-from quiltcli.formats.mesh.words import Statements, bad_rows, parsed_floats, plain_text, ragged, statements
-from quiltcli.geometry import FloatArray, IntArray
+from quiltcli.formats.mesh.words import Statements, bad_rows, parsed_floats, plain_text, statements
+from quiltcli.geometry import FloatArray, IntArray, offsets
 
 Column = NDArray[Any]
 
@@ -111,7 +111,7 @@ def _text_element(text: Statements, rows: IntArray, header: ElementHeader, skipp
             )
         raise StopReadingError(f"the rows of {header.name} are no numbers")
     element = Element(header.name, header.count, lines=text.lines(rows) + skipped)
-    start = ragged(sizes)
+    start = offsets(sizes)
     at, end = start[:-1].copy(), start[1:]
     for prop in header.properties:
         _long_enough(at + 1, end, start, element)
@@ -121,8 +121,8 @@ def _text_element(text: Statements, rows: IntArray, header: ElementHeader, skipp
             continue
         counts = _counts(flat[at], element)
         _long_enough(at + 1 + counts, end, start, element)
-        offsets = ragged(counts)
-        element.add(prop, List(offsets, flat[_places(at + 1, offsets)]))
+        own = offsets(counts)
+        element.add(prop, List(own, flat[_places(at + 1, own)]))
         at += 1 + counts
     return element
 
@@ -151,13 +151,13 @@ def _counts(written: FloatArray, element: Element) -> IntArray:
     return written.astype(np.int64)
 
 
-def _places(begin: IntArray, offsets: IntArray, size: int = 1) -> IntArray:
+def _places(begin: IntArray, own: IntArray, size: int = 1) -> IntArray:
     """Places of all values of lists that begin at `begin` (n,), in steps of `size`.
 
-    The offsets (n+1,) are those of the lists when joined.
+    `own` (n+1,) are the offsets of the lists when joined.
     """
-    rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], np.diff(offsets))
-    result: IntArray = np.repeat(begin, np.diff(offsets)) + size * rank
+    rank = np.arange(own[-1]) - np.repeat(own[:-1], np.diff(own))
+    result: IntArray = np.repeat(begin, np.diff(own)) + size * rank
     return result
 
 
@@ -216,8 +216,8 @@ def _even_lists(data: bytes, place: int, header: ElementHeader, order: str) -> t
     element = Element(header.name, header.count)
     for k, prop in enumerate(header.properties):
         column = _native(table[f"{k}"])
-        offsets = np.arange(header.count + 1, dtype=np.int64) * counts[k]
-        element.add(prop, List(offsets, column.reshape(-1)) if prop.count_code else column)
+        own = np.arange(header.count + 1, dtype=np.int64) * counts[k]
+        element.add(prop, List(own, column.reshape(-1)) if prop.count_code else column)
     return element, place + header.count * kind.itemsize
 
 
@@ -247,10 +247,10 @@ def _uneven_lists(data: bytes, place: int, header: ElementHeader, order: str) ->
     octets = np.frombuffer(data, np.uint8)
     for prop, (begin, counts) in zip(header.properties, begins, strict=True):
         kind = np.dtype(order + prop.code)
-        offsets = ragged(counts)
-        at = _places(begin, offsets, kind.itemsize)
+        own = offsets(counts)
+        at = _places(begin, own, kind.itemsize)
         values = octets[at[:, None] + np.arange(kind.itemsize)].view(kind).reshape(-1)
-        element.add(prop, List(offsets, _native(values)) if prop.count_code else _native(values))
+        element.add(prop, List(own, _native(values)) if prop.count_code else _native(values))
     return element, place
 
 

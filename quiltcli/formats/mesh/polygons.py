@@ -10,7 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from quiltcli.formats.mesh.ears import STRAIGHT, ear_clip, ear_sines, sides
-from quiltcli.geometry import BoolArray, FloatArray, IntArray, cross, dot, next_in_row, normalized, segments
+from quiltcli.geometry import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    cross,
+    dot,
+    next_in_row,
+    normalized,
+    segments,
+    some_rows,
+)
 
 
 class Triangles(NamedTuple):
@@ -87,7 +97,7 @@ def triangulate(points: FloatArray, start: IntArray) -> Triangles:
     fans = counts == 3
     wide = np.flatnonzero(~fans)
     if len(wide):
-        part, place = some_polygons(start, wide)
+        part, place = some_rows(start, wide)
         own = points[place]
         broken = ~np.logical_and.reduceat(np.isfinite(own).all(axis=1), part[:-1])
         broken |= ~np.logical_or.reduceat(own.any(axis=1), part[:-1])
@@ -102,13 +112,6 @@ def triangulate(points: FloatArray, start: IntArray) -> Triangles:
     return Triangles(np.concatenate([triangles.corners for triangles in found])[order], owner[order])
 
 
-def some_polygons(start: IntArray, faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Offsets of some of the polygons alone, and the places of their corners among all."""
-    part = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.diff(start)[faces])))
-    row, rank = segments(part)
-    return part, start[faces][row] + rank
-
-
 def triangle_areas(points: FloatArray, triangles: IntArray) -> FloatArray:
     """Signed areas (T,) in the plane, positive for triangles that turn to the left."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
@@ -119,7 +122,7 @@ def triangle_areas(points: FloatArray, triangles: IntArray) -> FloatArray:
 
 def _fans(start: IntArray, faces: IntArray) -> Triangles:
     """Fans about the first corner of each polygon."""
-    part, place = some_polygons(start, faces)
+    part, place = some_rows(start, faces)
     row, rank = segments(part)
     # Corner k of a fan, but for its first and last, makes the triangle (first, k, k + 1).
     second = np.flatnonzero((rank > 0) & (rank < np.diff(part)[row] - 1))

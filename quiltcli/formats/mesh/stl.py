@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from quiltcli.errors import MeshError, Problem
 from quiltcli.formats.mesh.colors import linear_from_srgb
 from quiltcli.formats.mesh.mesh import PolygonMesh, raise_problems
-from quiltcli.formats.mesh.words import bad_rows, parsed_floats, plain_text, ragged, statements
-from quiltcli.geometry import Float32Array, IntArray
+from quiltcli.formats.mesh.words import bad_rows, parsed_floats, plain_text, statements
+from quiltcli.geometry import Float32Array, IntArray, offsets
 
 _HEADER = 80
 _FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("spare", "<u2")])
@@ -104,7 +104,7 @@ def _text(data: bytes, path: Path) -> PolygonMesh:
         ]
         raise_problems(problems or [Problem("the vertices are no numbers", str(path))], str(path))
     assert flat is not None
-    start = ragged(sizes)
+    start = offsets(sizes)
     vertices = flat[start[:-1, None] + np.arange(3)].reshape(-1, 3)
     counts, lines = _loops(rows, led, text.lines(rows))
     problems = [
@@ -147,7 +147,7 @@ def _mesh(
     colors: Float32Array | None,
     vertex_lines: IntArray | None = None,
 ) -> PolygonMesh:
-    start = ragged(counts)
+    start = offsets(counts)
     return PolygonMesh(
         vertices=vertices,
         corner_start=start,

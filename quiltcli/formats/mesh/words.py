@@ -222,11 +222,6 @@ def float_or_none(word: str) -> float | None:
         return None
 
 
-def ragged(counts: IntArray) -> IntArray:
-    """Offsets (n+1,) of rows of these lengths."""
-    return np.concatenate((np.zeros(1, np.int64), np.cumsum(counts)))
-
-
 def bad_rows(text: Statements, rows: Iterable[int], skip: int, need: int) -> Iterator[tuple[int, list[str]]]:
     """Statements of which one of the `need` words after the first `skip` is no number, and those words."""
     for row in rows:

@@ -11,7 +11,7 @@ import numpy as np
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.display.weld import weld
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import Int32Array, IntArray, segments
+from quiltcli.geometry import Int32Array, IntArray, offsets, segments
 from quiltcli.job.layout import PACKING_METHODS, PackSpec
 from quiltcli.layout.from_uv import layout_from_polygons
 from quiltcli.layout.layout import Layout
@@ -187,7 +187,7 @@ def _pack_input(facets: Facets, rows: IntArray, wishes: PackSpec) -> PackInput:
     mine[rows] = True
     return PackInput(
         size=facets.size[rows],
-        corner_start=np.concatenate(([0], np.cumsum(np.diff(facets.corner_start)[rows]))),
+        corner_start=offsets(np.diff(facets.corner_start)[rows]),
         polygon=corner_pixels(facets)[mine[corner_row]],
         page=wishes.size or largest_page(wishes.aspect),
         padding=wishes.padding,

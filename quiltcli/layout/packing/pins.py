@@ -9,7 +9,7 @@ import numpy as np
 
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import IntArray, segments
+from quiltcli.geometry import IntArray, offsets, segments
 from quiltcli.job.layout import PackSpec
 from quiltcli.layout.align import misfits
 from quiltcli.layout.check import check_layout
@@ -77,7 +77,7 @@ def _placed_by_display(facets: Facets, given: Layout | None, wishes: PackSpec) -
         origin=facets.origin[row],
         du=facets.du[row],
         dv=facets.dv[row],
-        corner_start=np.concatenate(([0], np.cumsum(np.diff(facets.corner_start)[row]))),
+        corner_start=offsets(np.diff(facets.corner_start)[row]),
         polygon=corner_pixels(facets)[np.isin(corner_row, row)],
         pages=np.array([*begun, *[size] * (count - len(begun))], dtype=np.int32),
         padding=wishes.padding,

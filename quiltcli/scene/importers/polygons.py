@@ -12,8 +12,8 @@ import numpy as np
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.mesh.coverage import Coverage, coverage
 from quiltcli.formats.mesh.mtl import MeshMaterial, MeshTexture
-from quiltcli.formats.mesh.polygons import Triangles, plane_coordinates, some_polygons, triangulate
-from quiltcli.geometry import BoolArray, FloatArray, IntArray
+from quiltcli.formats.mesh.polygons import Triangles, plane_coordinates, triangulate
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, some_rows
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.materials import Surface, Texture
 
@@ -50,12 +50,12 @@ def parts_of_polygons(mesh: PolygonMesh) -> PolygonParts:
 
 def _triangles(mesh: PolygonMesh, faces: IntArray) -> tuple[Triangles, Coverage]:
     """Triangles of these faces; the second one of a quadrilateral begins at its third corner."""
-    start, place = some_polygons(mesh.corner_start, faces)
+    start, place = some_rows(mesh.corner_start, faces)
     points = np.zeros((len(place), 2))
     wide = np.flatnonzero(np.diff(start) > 3)
     with np.errstate(all="ignore"):  # vertices may be anywhere or nowhere
         if len(wide):
-            part, own = some_polygons(start, wide)
+            part, own = some_rows(start, wide)
             points[own] = plane_coordinates(mesh.vertices[mesh.corners[place[own]]], part)
         cut = triangulate(points, start)
         covered = coverage(points, start, cut) if len(wide) else Coverage()

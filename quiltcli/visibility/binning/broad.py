@@ -13,7 +13,7 @@ from functools import reduce
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, IntArray, dot, normalized, segments
+from quiltcli.geometry import FloatArray, IntArray, dot, normalized, offsets, segments
 
 _CHUNK = 1 << 20
 _NEAR_PLANE = 1e-6
@@ -190,7 +190,7 @@ class _Grid:
         once = owner.size == movers.index.size  # one cell each
         first = self.start[cell]
         counts = self.start[cell + 1] - first
-        visit, rank = segments(np.concatenate(([0], np.cumsum(counts))))
+        visit, rank = segments(offsets(counts))
         rank += first.take(visit)
         mover, target = owner.take(visit), self.members.take(rank)
         meets = np.ones(mover.size, dtype=np.bool_)
@@ -212,6 +212,6 @@ class _Grid:
         areas = _areas(cells)
         if areas.size and int(areas.max()) == 1:
             return np.arange(areas.size), y0 * self.side + x0
-        owner, rank = segments(np.concatenate(([0], np.cumsum(areas))))
+        owner, rank = segments(offsets(areas))
         row, column = np.divmod(rank, (x1 - x0 + 1).take(owner))
         return owner, (y0.take(owner) + row) * self.side + x0.take(owner) + column

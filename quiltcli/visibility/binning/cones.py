@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from quiltcli.display import Facets, convex_parts
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot, hull
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot, hull, offsets
 from quiltcli.layout import Layout
 from quiltcli.visibility.binning.broad import ConeGrids
 
@@ -146,7 +146,7 @@ def _padded(polygons: list[FloatArray]) -> FloatArray:
     counts = np.array([len(p) for p in polygons], dtype=np.int64)
     result = np.empty((counts.size, int(counts.max(initial=1)), 3))
     if polygons:
-        start = np.concatenate(([0], np.cumsum(counts)))
+        start = offsets(counts)
         rank = np.minimum(np.arange(result.shape[1]), counts[:, None] - 1)
         result[:] = np.concatenate(polygons)[start[:-1, None] + rank]
     return result

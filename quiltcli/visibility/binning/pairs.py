@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, gather_corners, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, gather_corners, offsets, segments
 from quiltcli.visibility.binning.broad import candidate_pairs
 from quiltcli.visibility.binning.cones import Cones, Parts, facet_parts, lit_cones, overlapping
 from quiltcli.visibility.binning.cores import facet_cores
@@ -113,7 +113,7 @@ class Cores:
         if not has_embree():
             return
         corners, counts = facet_cores(cones)
-        part, rank = segments(np.concatenate(([0], np.cumsum(np.maximum(counts - 2, 0)))))
+        part, rank = segments(offsets(np.maximum(counts - 2, 0)))
         first = part * corners.shape[1]
         faces = np.stack((first, first + rank + 1, first + rank + 2), axis=1).astype(np.int32)
         self._part = np.append(part, -1).astype(np.int32)

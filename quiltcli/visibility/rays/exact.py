@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, cross, dot, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, cross, dot, offsets, segments
 from quiltcli.visibility.rays.embree import Target, measure_along, reach_along
 from quiltcli.visibility.rays.pixels import Places
 
@@ -39,7 +39,7 @@ class Neighbours:
         corner, start, touching = self._table
         at = corner[triangle].reshape(-1)
         counts = start[at + 1] - start[at]
-        which, rank = segments(np.concatenate(([0], np.cumsum(counts))))
+        which, rank = segments(offsets(counts))
         key = row.repeat(3)[which] * len(self.triangles) + touching[start[at][which] + rank]
         key = np.unique(key)
         return key // len(self.triangles), key % len(self.triangles)

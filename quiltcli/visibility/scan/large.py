@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments, slices
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, offsets, segments, slices
 from quiltcli.visibility.scan.depth import DepthRange
 from quiltcli.visibility.scan.keys import depth_part, make_keys, serial_of, serial_part
 from quiltcli.visibility.scan.order import BatchOrder
@@ -182,7 +182,7 @@ def _tiles(rows: IntArray, box: Int32Array) -> tuple[IntArray, IntArray, IntArra
     """Row, first column and first row (S,) of all tiles that the pixel boxes (4, R) of rows (R,) touch."""
     x0, x1, y0, y1 = (box // TILE).astype(np.int64)
     across = x1 - x0 + 1
-    owner, rank = segments(np.concatenate(([0], np.cumsum(across * (y1 - y0 + 1)))))
+    owner, rank = segments(offsets(across * (y1 - y0 + 1)))
     y, x = np.divmod(rank, across[owner])
     return rows[owner], (x0[owner] + x) * TILE, (y0[owner] + y) * TILE
 

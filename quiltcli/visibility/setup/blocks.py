@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, OwnerArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, OwnerArray, offsets, segments
 from quiltcli.layout import Layout, quilt_polygons
 
 T = TypeVar("T", bound=np.generic)
@@ -75,7 +75,7 @@ class Blocks:
 
     def any_tile(self, tiles: BoolArray) -> BoolArray:
         """Blocks (B,) that have any of these microtiles (microtiles,)."""
-        count = np.concatenate(([0], np.cumsum(tiles)))
+        count = offsets(tiles)
         return np.asarray(np.diff(count.take(self.tile_start)) > 0)
 
 
@@ -108,7 +108,7 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
     rectangle[:, 0] -= margin
     extent = rectangle[:, 2:] - rectangle[:, :2]
     counts = -(-extent // SIDE)
-    start = np.concatenate(([0], np.cumsum(counts[:, 0] * counts[:, 1])))
+    start = offsets(counts[:, 0] * counts[:, 1])
     # Where each block lies on its page, and in the flat buffers.
     facet, rank = segments(start)
     columns = np.maximum(counts[:, 0], 1)
@@ -121,7 +121,7 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
     address = layout.page_offset[page] + y0 * stride + x0
     # Its microtiles, and which of their pixels are the facet's.
     across = -(-width // 8)
-    tile_start = np.concatenate(([0], np.cumsum(across * -(-height // 8))))
+    tile_start = offsets(across * -(-height // 8))
     owned, inside = _owned_pixels(facet, width, height, address, stride, owners)
     return Blocks(
         start=start,
@@ -198,7 +198,7 @@ def cut_batches(
         of a triangular facet is half empty.
     """
     # Pixels that are drawn of every block; with several workers, smaller shares for each.
-    used = np.concatenate(([0], np.cumsum(blocks.used)))
+    used = offsets(blocks.used)
     areas = 64 * np.diff(used.take(blocks.tile_start))
     most = BATCH_PIXELS
     if workers > 1:
@@ -261,7 +261,7 @@ def new_canvas(block: IntArray, blocks: Blocks) -> Canvas:
     """An empty canvas for the blocks with these indices."""
     # The blocks' microtiles one after the other.
     tiles = blocks.tile_start[block + 1] - blocks.tile_start[block]
-    tile_start = np.concatenate(([0], np.cumsum(tiles)))
+    tile_start = offsets(tiles)
     count = int(tile_start[-1])
     across = blocks.tiles_across[block]
     place, number = segments(tile_start)

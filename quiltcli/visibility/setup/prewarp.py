@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, gather_corners, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, gather_corners, offsets, segments
 from quiltcli.projection.planar import QuiltRays
 from quiltcli.visibility.binning.pairs import Pairs
 from quiltcli.visibility.setup.blocks import SIDE, Blocks
@@ -63,7 +63,7 @@ class BlockPairs:
     def of(self, block: IntArray) -> tuple[Int32Array, IntArray]:
         """Triangles (n,) of the pairs of some blocks (K,), and for each the place among these blocks."""
         count = np.ascontiguousarray(self.count[:, block].T).reshape(-1)
-        piece, rank = segments(np.concatenate(([0], np.cumsum(count))))
+        piece, rank = segments(offsets(count))
         rank += np.ascontiguousarray(self.first[:, block].T).reshape(-1).take(piece)
         return self.memory.take(rank), piece // len(self.count)
 
@@ -192,7 +192,7 @@ def _blocks_under(
     x1, y1 = box[1::2] // SIDE
     counts = (x1 - x0 + 1) * (y1 - y0 + 1)
     counts[(box[1] < box[0]) | (box[3] < box[2])] = 0
-    owner, rank = segments(np.concatenate(([0], np.cumsum(counts))))
+    owner, rank = segments(offsets(counts))
     across = (x1 - x0 + 1)[owner]
     column = x0[owner] + rank % across
     row = y0[owner] + rank // across

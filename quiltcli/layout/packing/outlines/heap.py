@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quiltcli.geometry import IntArray, segments
+from quiltcli.geometry import IntArray, offsets, segments
 from quiltcli.layout.packing.model import PackInput
 from quiltcli.layout.packing.outlines.shapes import Shapes
 
@@ -67,7 +67,7 @@ class Heap:
         if not others.size:
             return -(-limit // self._align) * self._align
         begin, end_of = np.maximum(low[others], first), np.minimum(high[others], stop)
-        other, rank = segments(np.concatenate(([0], np.cumsum(end_of - begin))))
+        other, rank = segments(offsets(end_of - begin))
         theirs_low, theirs_high = self._lanes(others[other], (begin - low[others])[other] + rank, axis)
         mine_low, mine_high = self._kept(facet, axis)
         mine = (begin - first)[other] + rank

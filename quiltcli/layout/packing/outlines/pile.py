@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from quiltcli.geometry import segments
+from quiltcli.geometry import offsets, segments
 from quiltcli.layout.packing.model import PackInput, PackResult
 from quiltcli.layout.packing.outlines.grid import Cells, Page, Runs, begun_pages, best_spot, kept_runs
 from quiltcli.layout.packing.outlines.heap import Heap
@@ -50,8 +50,8 @@ def cells_of(shapes: Shapes, cell: int) -> list[list[Cells]]:
     """Every shape in every orientation on the grid; computed for all at once."""
     tall = shapes.size[:, :, 1].astype(np.int64)
     count = -(-tall // cell)
-    first = np.concatenate(([0], np.cumsum(count.ravel())))
-    row, rank = segments(np.concatenate(([0], np.cumsum(tall.ravel()))))
+    first = offsets(count.ravel())
+    row, rank = segments(offsets(tall.ravel()))
     line = shapes.start.ravel()[row] + rank
     at = first[row] + rank // cell
     low, high = np.full(first[-1], NOWHERE), np.full(first[-1], -NOWHERE)

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, offsets, segments
 from quiltcli.layout.layout import PIXEL_TOLERANCE
 from quiltcli.layout.packing.model import PackInput
 
@@ -97,8 +97,8 @@ def shapes_of_edges(
     """
     left, right = _extents(size, shape, start, end)
     top, bottom = _extents(size[:, ::-1], shape, start[:, ::-1], end[:, ::-1])
-    row, y = segments(_offsets(size[:, 1]))
-    column, x = segments(_offsets(size[:, 0]))
+    row, y = segments(offsets(size[:, 1]))
+    column, x = segments(offsets(size[:, 0]))
     width, height = size[row, 0], size[column, 1]
     area = np.zeros(len(size), dtype=np.int64)
     np.add.at(area, row, np.maximum(right - left, 0))
@@ -119,7 +119,7 @@ def shapes_of_edges(
             lying,
         ]
     sizes = np.stack([size[:, :: -1 if turn % 2 else 1] for turn in range(len(tables))], axis=1)
-    steps = [_offsets(sizes[:, turn, 1]) for turn in range(len(tables))]
+    steps = [offsets(sizes[:, turn, 1]) for turn in range(len(tables))]
     base = np.cumsum([0, *(int(step[-1]) for step in steps)])
     starts = np.stack([step[:-1] + base[turn] for turn, step in enumerate(steps)], axis=1)
     lefts, rights = (np.concatenate(side) for side in zip(*tables, strict=True))
@@ -127,10 +127,6 @@ def shapes_of_edges(
 
 
 _Sides = tuple[Int32Array, Int32Array]
-
-
-def _offsets(counts: Int32Array) -> IntArray:
-    return np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))
 
 
 def _reversed(owner: IntArray, rank: IntArray, count: Int32Array) -> IntArray:
@@ -161,7 +157,7 @@ def _extents(size: Int32Array, shape: IntArray, start: FloatArray, end: FloatArr
     limit = size[shape]
     first = np.clip(np.floor(upper[:, 1] + PIXEL_TOLERANCE), 0, limit[:, 1]).astype(np.int64)
     last = np.clip(np.ceil(lower[:, 1] - PIXEL_TOLERANCE), first, limit[:, 1]).astype(np.int64)
-    edge, rank = segments(np.concatenate(([0], np.cumsum(last - first))))
+    edge, rank = segments(offsets(last - first))
     y = first[edge] + rank
     run = lower - upper
     slope = np.divide(run[:, 0], run[:, 1], out=np.zeros(len(run)), where=run[:, 1] > 0)[edge]
@@ -174,7 +170,7 @@ def _extents(size: Int32Array, shape: IntArray, start: FloatArray, end: FloatArr
     width = limit[edge, 0]
     low = np.clip(np.floor(np.minimum(a, b) + PIXEL_TOLERANCE), 0, width).astype(np.int32)
     high = np.clip(np.ceil(np.maximum(a, b) - PIXEL_TOLERANCE), 0, width).astype(np.int32)
-    offset = _offsets(size[:, 1])
+    offset = offsets(size[:, 1])
     at = offset[shape[edge]] + y
     left = np.full(int(offset[-1]), NOWHERE, dtype=np.int32)
     right = np.full(int(offset[-1]), -NOWHERE, dtype=np.int32)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import IntArray, segments
+from quiltcli.geometry import IntArray, offsets, segments
 from quiltcli.layout.packing.model import PackInput, PackResult
 from quiltcli.layout.packing.outlines.shapes import NOWHERE, Shapes
 from quiltcli.layout.packing.rectangles.rooms import Strip, Strips
@@ -65,7 +65,7 @@ def best_for_rows(shapes: Shapes, padding: int) -> IntArray:
     taken = []
     for turn in (0, 1):
         start, height = shapes.start[:, turn], shapes.size[:, turn, 1].astype(np.int64)
-        row, y = segments(np.concatenate(([0], np.cumsum(height))))
+        row, y = segments(offsets(height))
         upright, turned = start[row] + y, shapes.start[row, turn + 2] + y
         first = np.cumsum(height) - height
         # Steps to the right from one to the next; rows that are not touched are never the greatest.
@@ -239,7 +239,7 @@ class _Row:
         if not fits.any():
             return None
         low, tall = self._low[use], self._tall[use]
-        before = np.concatenate(([0], np.cumsum(self._front, dtype=np.int64)))
+        before = offsets(self._front)
         wasted = tall * x + self._taken[use] - before[low + tall] + before[low]
         ahead = np.maximum(x + self._wide[use] + self._padding - int(self._front.max()), 0)
         slack = self._rule.slack * (self._height - tall) * ahead
