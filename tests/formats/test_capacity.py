@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -40,8 +41,16 @@ def test_never_less_than_nothing(machine: Path) -> None:
     assert capacity.free_memory() == 0
 
 
-def test_the_disk_of_a_folder_that_is_yet_to_be_made(tmp_path: Path) -> None:
-    assert capacity.free_disk(tmp_path / "a" / "b" / "c") == capacity.free_disk(tmp_path)
+def test_the_disk_of_a_folder_that_is_yet_to_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real, asked = shutil.disk_usage, []
+
+    def disk_usage(path: Path) -> object:
+        asked.append(path)
+        return real(path)._replace(free=len(asked))  # others write to the disk meanwhile
+
+    monkeypatch.setattr(shutil, "disk_usage", disk_usage)
+    assert capacity.free_disk(tmp_path / "a" / "b" / "c") == 4
+    assert asked[-1] == tmp_path
 
 
 def test_bytes_are_told_in_units_of_disks() -> None:

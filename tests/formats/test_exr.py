@@ -1,6 +1,7 @@
 import errno
 import os
 import resource
+import shutil
 from fractions import Fraction
 from pathlib import Path
 
@@ -399,3 +400,17 @@ def test_every_compression_a_job_may_name_is_known():
     from quiltcli.job.job import COMPRESSIONS
 
     assert set(COMPRESSIONS) <= set(exr.compressions())
+
+
+def test_a_folder_that_goes_while_a_file_is_written_is_told_of_the_file(tmp_path, monkeypatch):
+    folder = tmp_path / "out"
+    folder.mkdir()
+
+    class Vanishing:
+        def write(self, name):
+            shutil.rmtree(folder)
+
+    monkeypatch.setattr(exr, "_library_file", lambda *given: Vanishing())
+    with pytest.raises(OutputError) as caught:
+        write_exr(folder / "a.exr", noise(), {})
+    assert said(caught) == f"{folder}/a.exr: cannot be written: No such file or directory"

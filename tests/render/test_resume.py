@@ -213,9 +213,12 @@ def test_a_disk_that_is_full_from_the_start_is_no_bad_input(
 
 def test_a_folder_that_goes_is_a_failure_of_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job, out = write_tiny_job(tmp_path, "144, 72"), tmp_path / "out"
+    # More frames than can be drawn or under way before it is known that the first one is done.
+    replaced(tmp_path, "job.yaml", "frames: 1-4", "frames: 1-9")
 
     def gone(record: object) -> None:
-        (out / "quilt").rename(tmp_path / "elsewhere")
+        if not (tmp_path / "elsewhere").exists():
+            (out / "quilt").rename(tmp_path / "elsewhere")
 
     with pytest.raises(CheckFailedError, match=r"out/quilt.*: cannot be written: No such file"):
         render(load_job(job), RenderOptions(threads=1), Listener(frame_done=gone))

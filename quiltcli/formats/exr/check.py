@@ -10,6 +10,7 @@ from __future__ import annotations
 import mmap
 import struct
 from pathlib import Path
+from typing import BinaryIO
 
 from quiltcli.errors import OutputError
 from quiltcli.formats.capacity import bytes_text, free_memory
@@ -27,15 +28,20 @@ def exr_fault(path: Path) -> str:
         OutputError: there is no such file, or it cannot be read.
     """
     with open_input(path, OutputError, "an EXR") as file:
-        if not file.seek(0, 2):
-            return "is empty, expected an OpenEXR image"
-        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            try:
-                _check(data)
-            except struct.error:
-                return f"is truncated: it ends inside its header or chunk table, after {len(data)} bytes"
-            except FaultError as fault:
-                return str(fault)
+        return structure_fault(file)
+
+
+def structure_fault(file: BinaryIO) -> str:
+    """What is wrong with the structure of an open file, "" when it is whole (OSError)."""
+    if not file.seek(0, 2):
+        return "is empty, expected an OpenEXR image"
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        try:
+            _check(data)
+        except struct.error:
+            return f"is truncated: it ends inside its header or chunk table, after {len(data)} bytes"
+        except FaultError as fault:
+            return str(fault)
     return ""
 
 

@@ -16,7 +16,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem
-from quiltcli.formats.exr.check import exr_fault, pixels_fault
+from quiltcli.formats.exr.check import exr_fault, pixels_fault, structure_fault
 from quiltcli.formats.exr.digest import ATTRIBUTE, BLANK, seal
 from quiltcli.formats.whole import whole_file, write_problem
 
@@ -122,7 +122,9 @@ def write_images(path: Path, images: Sequence[Image]) -> None:
         except RuntimeError as error:
             raise OutputError(write_problem(path, error)) from error
         # The library's stream is flushed when it is destroyed, where a full disk goes unreported.
-        if fault := exr_fault(temporary):
+        with temporary.open("rb") as written:
+            fault = structure_fault(written)
+        if fault:
             raise OutputError(Problem(f"cannot be written: what reached the disk {fault}", file=str(path)))
         seal(temporary)
 
