@@ -27,9 +27,10 @@ from quiltcli.visibility.resolve.whole import WholeTiles
 from quiltcli.visibility.scan.depth import DepthRange, triangles_in_range
 from quiltcli.visibility.scan.depth_buffers import DepthOrder
 from quiltcli.visibility.scan.keys import serial_bits
-from quiltcli.visibility.scan.large import covering_keys, draw_large, large_spans
+from quiltcli.visibility.scan.large import covering_keys, draw_large
 from quiltcli.visibility.scan.order import BatchOrder
 from quiltcli.visibility.scan.small import LIMIT, draw_small
+from quiltcli.visibility.scan.spans import large_spans
 from quiltcli.visibility.setup.blocks import (
     Blocks,
     Canvas,
