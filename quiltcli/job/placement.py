@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from quiltcli.geometry import FloatArray, quaternions, transform
 from quiltcli.geometry.interpolation import TURNINGS, VALUES
 from quiltcli.job.display import Scale, TransformSpec
+from quiltcli.job.keyframed import Keyframed
 from quiltcli.job.model import Complaint, Listed, Model, OneOf, Vec3
 
 # Sines differ in their last bit from one machine to the next; what is kept of them does not.
@@ -35,7 +36,7 @@ class TransformKeySpec(Model):
             yield ("scale",), "must not be 0"
 
 
-class PlacementSpec(TransformSpec):
+class PlacementSpec(Keyframed, TransformSpec):
     """Scale, then rotate about X, then Y, then Z, then translate; or a matrix; or keyframes of the former.
 
     Between keyframes shift and scale are interpolated as numbers and the rotation as a quaternion, the
@@ -46,14 +47,6 @@ class PlacementSpec(TransformSpec):
     """Places at some frames, instead of one place; the ends are held."""
     interpolation: Annotated[str, OneOf(("linear", "smooth", "hold"))] | None = None
     """Between keyframes: linear (the default), smooth, hold."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _default_interpolation(cls, value: Any) -> Any:
-        """Only keyframes are interpolated: the default belongs to them alone."""
-        if isinstance(value, dict) and value.get("keyframes") is not None:
-            return {"interpolation": "linear", **value}
-        return value
 
     @property
     def moves(self) -> bool:
@@ -83,19 +76,13 @@ class PlacementSpec(TransformSpec):
     def cross_checks(self) -> Iterator[Complaint]:
         """Keyframes stand alone, each at a frame of its own; nothing is turned inside out on the way."""
         yield from super().cross_checks()
+        yield from self.keyframe_checks()
         if self.keyframes is None:
-            if self.interpolation is not None:
-                yield ("interpolation",), "belongs to keyframes, and there are none"
             return
         for name in ("translate", "rotate_deg", "scale", "matrix"):
             if getattr(self, name) is not None:
                 yield (name,), "cannot stand beside keyframes (expected one or the other)"
-        first: dict[int, int] = {}
         for i, key in enumerate(self.keyframes):
-            if key.frame in first:
-                words = f"frame {key.frame} is already given by keyframes[{first[key.frame]}]"
-                yield ("keyframes", i, "frame"), words
-            first.setdefault(key.frame, i)
             if (np.sign(key.scale) != np.sign(self.keyframes[0].scale)).any():
                 words = "mirrors otherwise than keyframes[0] (give each axis one sign in all keyframes)"
                 yield ("keyframes", i, "scale"), words

@@ -12,12 +12,12 @@ from pydantic import (
     BeforeValidator,
     Field,
     WithJsonSchema,
-    model_validator,
 )
 
 from quiltcli.errors import JobError
 from quiltcli.job.display import Units
 from quiltcli.job.frames import parse_frames
+from quiltcli.job.keyframed import Keyframed
 from quiltcli.job.lengths import UNITS
 from quiltcli.job.model import (
     FARTHEST,
@@ -199,7 +199,7 @@ def _csv(value: Any) -> Any:
 OR_FILE = ShortFor(_csv, {"type": "string", "format": "path", "minLength": 1})
 
 
-class PathSpec(Model):
+class PathSpec(Keyframed):
     """Where the viewer is: exactly one kind of path."""
 
     keyframes: Annotated[tuple[KeyframeSpec, ...], Listed, Field(min_length=1)] | None = None
@@ -213,32 +213,17 @@ class PathSpec(Model):
     recorded: Annotated[RecordedSpec, OR_FILE] | None = None
     """A take of a tracker or a camera: a file name, or a mapping with `file`."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _default_interpolation(cls, value: Any) -> Any:
-        """Only keyframes are interpolated: the default belongs to them alone."""
-        if isinstance(value, dict) and value.get("keyframes") is not None:
-            return {"interpolation": "linear", **value}
-        return value
-
     def cross_checks(self) -> Iterator[Complaint]:
         """One kind, keyframes apart in time, all aimed the same way."""
         yield from exactly_one(self, "keyframes", "orbit", "csv", "recorded")
-        if self.keyframes is None:
-            if self.interpolation is not None:
-                yield ("interpolation",), "belongs to keyframes, and there are none"
-            return
-        first: dict[int, int] = {}
-        for i, key in enumerate(self.keyframes):
-            if key.frame in first:
-                words = f"frame {key.frame} is already given by keyframes[{first[key.frame]}]"
-                yield ("keyframes", i, "frame"), words
-            first.setdefault(key.frame, i)
-            if key.aim != self.keyframes[0].aim:
+        yield from self.keyframe_checks()
+        keyframes = self.keyframes or ()
+        for i, key in enumerate(keyframes):
+            if key.aim != keyframes[0].aim:
                 words = "keyframes[0] aims the other way (use look_at in all keyframes, or look in all)"
-                if "orientation" in (key.aim, self.keyframes[0].aim):
+                if "orientation" in (key.aim, keyframes[0].aim):
                     words = "keyframes[0] aims otherwise (use orientation in all keyframes, or in none)"
-                elif not (key.aim and self.keyframes[0].aim):
+                elif not (key.aim and keyframes[0].aim):
                     words = "keyframes[0] aims otherwise (aim all keyframes, or none)"
                 yield ("keyframes", i, key.aim or "position"), words
 
