@@ -13,6 +13,7 @@ from quiltcli.display import Facets
 from quiltcli.exchange.pixelmaps.naming import facet_label, page_files
 from quiltcli.exchange.pixelmaps.placing import placed_rows
 from quiltcli.formats.drawing.font import HEIGHT, text_mask, text_width
+from quiltcli.formats.drawing.svg import svg_element
 from quiltcli.formats.whole import write_text
 from quiltcli.layout import Layout, pixel_owners
 
@@ -40,16 +41,13 @@ def svg_template(layout: Layout, facets: Facets | None, page: int) -> str:
     """The drawing of a page (0-based)."""
     width, height = layout.pages[page]
     names = facets.names if facets else ()
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}"'
-        f' viewBox="0 0 {width} {height}">',
-    ]
+    lines: list[str] = []
     for row in placed_rows(layout):
         if layout.page[row] == page:
             facet = int(layout.facet[row])
             name = names[facet - 1] if facet <= len(names) else ""
             lines += _facet(layout, row, facet_label(facet, names), name)
-    return "\n".join([*lines, "</svg>"]) + "\n"
+    return svg_element(width, height, lines) + "\n"
 
 
 def _facet(layout: Layout, row: int, label: str, name: str) -> list[str]:

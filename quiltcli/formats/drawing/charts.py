@@ -9,6 +9,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from quiltcli.formats.drawing.svg import svg_element
 from quiltcli.geometry import FloatArray
 
 # Okabe & Ito's colours, which most people with any colour vision can tell apart.
@@ -171,8 +172,4 @@ def _text(x: float, y: float, text: str, anchor: str = "start", more: str = "") 
 
 
 def _document(size: tuple[int, int], parts: Sequence[str]) -> str:
-    head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size[0]} {size[1]}" width="{size[0]}"'
-        f' height="{size[1]}" font-family="sans-serif" font-size="12" role="img">'
-    )
-    return "\n".join([head, *parts, "</svg>"])
+    return svg_element(*size, parts, ' font-family="sans-serif" font-size="12" role="img"')

@@ -11,15 +11,14 @@ from quiltcli.geometry import FloatArray
 
 def svg_document(width: int, height: int, paper: str, items: Iterable[str]) -> str:
     """A document of this size in pixels, on paper of this colour."""
-    size = f'width="{width}" height="{height}"'
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {width} {height}"'
-        ' font-family="sans-serif">',
-        f'<rect {size} fill="{paper}"/>',
-        *items,
-        "</svg>",
-    ]
-    return "\n".join(lines) + "\n"
+    sheet = f'<rect width="{width}" height="{height}" fill="{paper}"/>'
+    return svg_element(width, height, [sheet, *items], ' font-family="sans-serif"') + "\n"
+
+
+def svg_element(width: int, height: int, items: Iterable[str], more: str = "") -> str:
+    """The picture by itself, to stand in a page; `more` are further attributes."""
+    size = f'width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+    return "\n".join([f'<svg xmlns="http://www.w3.org/2000/svg" {size}{more}>', *items, "</svg>"])
 
 
 def svg_polygon(shape: Shape, more: str = "") -> str:
