@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from quiltcli.cli.options import FRAMES, PATH, SETS
+from quiltcli.cli.options import PATH, SETS, frames_option
 
 
 @click.command()
@@ -18,7 +18,7 @@ from quiltcli.cli.options import FRAMES, PATH, SETS
     required=True,
     help="File to write: .json, .py (Blender), .usda, .pvx (ParaView) or .sgct.json.",
 )
-@click.option("-f", "--frames", type=FRAMES, help="Frames, such as 1-240; the job's by default.")
+@frames_option("Frames, such as 1-240; the job's by default.")
 @SETS
 def cameras(job: Path, output: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...]) -> None:
     """Write the exact camera of every facet, frame and eye of JOB: its picture is the facet's image."""

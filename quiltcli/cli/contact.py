@@ -7,20 +7,13 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, FRAMES, PATH, STILL_VIEW
+from quiltcli.cli.options import EXPOSURE, PATH, STILL_VIEW, frames_option
 
 
 @click.command()
 @click.argument("out", type=PATH)
 @click.option("-o", "--output", type=PATH, required=True, help="Sheet to write, as .png or .tif.")
-@click.option(
-    "-f",
-    "--frames",
-    "--frame",
-    "frames",
-    type=FRAMES,
-    help="Frames; all of pages, the first of facets by default.",
-)
+@frames_option("Frames; all of pages, the first of facets by default.")
 @click.option("--pages", "kind", flag_value="page", help="Pages of the quilt, the default if there are any.")
 @click.option("--facets", "kind", flag_value="facet", help="Images of facets.")
 @click.option("--columns", type=click.IntRange(min=1), help="Images in a row.")

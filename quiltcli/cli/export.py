@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from quiltcli.cli.options import MAP_FORMAT, PATH
+from quiltcli.cli.printing import print_files
 
 
 @click.command()
@@ -30,7 +31,4 @@ def export(layout: Path, output: Path, format_name: str | None, display: Path | 
 
     loaded = read_layout(layout)
     written = write_map(loaded, known_display(loaded, display), output, format_name)
-    for path in written[:12]:
-        click.echo(str(path))
-    if len(written) > 12:
-        click.echo(f"and {len(written) - 12} more in {written[-1].parent}")
+    print_files(written, written[-1].parent)

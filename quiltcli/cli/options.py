@@ -154,3 +154,8 @@ SETS = click.option(
 )
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace images that exist.")
 EXPOSURE = click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
+
+
+def frames_option(words: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The option `-f`, which is `--frames` and `--frame`."""
+    return click.option("-f", "--frames", "--frame", "frames", type=FRAMES, help=words)

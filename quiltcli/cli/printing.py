@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import click
 
 ROWS = 20  # of a table, before --all
+_FILES = 12
+
+
+def print_files(written: Sequence[Path], folder: Path) -> None:
+    """The first files that were written, and how many more are in their folder."""
+    for path in written[:_FILES]:
+        click.echo(str(path))
+    if len(written) > _FILES:
+        click.echo(f"and {len(written) - _FILES} more in {folder}")
 
 
 def print_rows(columns: Any, rows: Any) -> None:

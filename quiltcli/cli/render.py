@@ -8,20 +8,13 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import FACETS, FRAMES, OVERWRITE, PATH, SETS, THREADS
+from quiltcli.cli.options import FACETS, OVERWRITE, PATH, SETS, THREADS, frames_option
 from quiltcli.cli.printing import print_aligned
 
 
 @click.command()
 @click.argument("job", type=PATH)
-@click.option(
-    "-f",
-    "--frames",
-    "--frame",
-    "frames",
-    type=FRAMES,
-    help="Frames such as 1-240, 1-9x2 or 1,5,20-30; inclusive.",
-)
+@frames_option("Frames such as 1-240, 1-9x2 or 1,5,20-30; inclusive.")
 @click.option("-o", "--output", type=PATH, help="Output folder, instead of the job's.")
 @click.option("--resume", is_flag=True, help="Skip frames that are complete and made by the same job.")
 @OVERWRITE

@@ -7,20 +7,13 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, FRAMES, PATH, POINT, SETS, SIZE, THREADS, VIEW
+from quiltcli.cli.options import EXPOSURE, PATH, POINT, SETS, SIZE, THREADS, VIEW, frames_option
 from quiltcli.cli.stereo import MATRICES
 
 
 @click.command()
 @click.argument("job", type=PATH)
-@click.option(
-    "-f",
-    "--frames",
-    "--frame",
-    "frames",
-    type=FRAMES,
-    help="Frames such as 7 or 1-12; the job's first by default.",
-)
+@frames_option("Frames such as 7 or 1-12; the job's first by default.")
 @click.option("-o", "--output", type=PATH, help="PNG to write; #### in its name is the frame number.")
 @click.option("--video", type=PATH, help="Film to write of all the frames, as .mp4 or .mov.")
 @click.option("--size", type=SIZE, default="1200x900", show_default=True, help="Size of the picture.")

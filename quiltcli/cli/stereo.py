@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from quiltcli.cli.options import FRAMES, PATH
+from quiltcli.cli.options import OVERWRITE, PATH, frames_option
+from quiltcli.cli.printing import print_files
 
 MODES = (
     *("anaglyph", "side-by-side", "side-by-side-half", "top-bottom", "top-bottom-half"),
@@ -30,10 +31,10 @@ MATRICES = (
     help="Colours of an anaglyph.",
 )
 @click.option("--of", "kind", type=click.Choice(("pages", "facets")), default="pages", show_default=True)
-@click.option("-f", "--frames", type=FRAMES, help="Frames; all by default.")
+@frames_option("Frames; all by default.")
 @click.option("--swap", is_flag=True, help="Take left for right.")
 @click.option("--sync-line", is_flag=True, help="A blue line in the last row, for shutter glasses.")
-@click.option("--overwrite", is_flag=True, help="Replace images that exist.")
+@OVERWRITE
 def stereo(
     out: Path,
     output: Path,
@@ -54,7 +55,4 @@ def stereo(
 
     options = StereoOptions(mode, kind.removesuffix("s"), frames, matrix, swap, sync_line, overwrite)
     written = write_stereo(out, output, options)
-    for path in written[:12]:
-        click.echo(str(path))
-    if len(written) > 12:
-        click.echo(f"and {len(written) - 12} more in {output}")
+    print_files(written, output)

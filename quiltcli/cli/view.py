@@ -7,19 +7,12 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, FRAMES, PATH, VIEW
+from quiltcli.cli.options import EXPOSURE, PATH, VIEW, frames_option
 
 
 @click.command()
 @click.argument("out", type=PATH)
-@click.option(
-    "-f",
-    "--frames",
-    "--frame",
-    "frames",
-    type=FRAMES,
-    help="Frames such as 7 or 1-12; all that are there by default.",
-)
+@frames_option("Frames such as 7 or 1-12; all that are there by default.")
 @click.option("-o", "--output", type=PATH, help="Page to write, as .html; OUT/view.html by default.")
 @click.option("--model/--no-model", default=True, help="Write a model beside it, as .glb.")
 @click.option(
