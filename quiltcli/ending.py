@@ -16,9 +16,8 @@ from types import FrameType
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-ECHO_SECONDS = (
-    1.0  # in which a second SIGTERM is the first: `timeout` sends one to the process, one to its group
-)
+# In which a second SIGTERM is the first: `timeout` sends one to the process, one to its group.
+ECHO_SECONDS = 1.0
 _armed: list[int] = []  # signals that this module answers
 
 

@@ -54,6 +54,13 @@ class QuiltError(Exception):
         super().__init__("\n".join(map(str, self.problems)))
 
 
+def first_of(problems: Sequence[Problem], most: int, file: str) -> list[Problem]:
+    """The first problems, and one that counts the rest."""
+    more = len(problems) - most
+    rest = [Problem(f"and {more} problems more", file)] if more > 0 else []
+    return [*problems[:most], *rest]
+
+
 class JobError(QuiltError, ValueError):
     """A YAML file that cannot be read, or says something impossible."""
 

@@ -11,7 +11,7 @@ from quiltcli.display.facets import Facets, places_of
 from quiltcli.display.notices import likely_unit
 from quiltcli.display.panels import panel_facets
 from quiltcli.display.rasters import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
-from quiltcli.errors import DisplayError, Problem
+from quiltcli.errors import DisplayError, Problem, first_of, raise_all
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
 from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, dot, normalized
@@ -179,9 +179,4 @@ def _impossible_sizes(
 
 def _raise(problems: Sequence[Problem], spec: DisplayFile) -> None:
     """Raise the first problems found together, and the count of the rest."""
-    if not problems:
-        return
-    shown = list(problems[:_MOST_PROBLEMS])
-    if len(problems) > _MOST_PROBLEMS:
-        shown.append(Problem(f"and {len(problems) - _MOST_PROBLEMS} problems more", str(spec.source.path)))
-    raise DisplayError(shown)
+    raise_all(DisplayError, first_of(problems, _MOST_PROBLEMS, str(spec.source.path)))

@@ -88,7 +88,7 @@ def shared_array(length: int, dtype: Any) -> NDArray[Any]:
 
 
 def shared_buffers(stage: Stage) -> Buffers:
-    """As `blank.new_buffers`, in memory that workers share."""
+    """As `buffers.new_buffers`, in memory that workers share."""
     buffers = {}
     for name, (dtype, empty) in exr_channels(stage.job.output.channels).items():
         buffers[name] = shared_array(stage.owners.size, dtype)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.display import Facets, corner_pixels
-from quiltcli.errors import LayoutError, OutputError, Problem, raise_all
+from quiltcli.errors import LayoutError, OutputError, Problem, first_of, raise_all
 from quiltcli.geometry import FloatArray, Int32Array, segments
 from quiltcli.layout import Layout, align, check_layout, whole_pixel
 from quiltcli.layout.from_uv import MIRROR, QUARTER_TURNS
@@ -165,7 +165,5 @@ def display_rasters(display: Facets, facet: Sequence[int] | Int32Array) -> Raste
 
 def entries(path: Path, problems: Sequence[Problem], most: int = 50) -> None:
     """Raise one `LayoutError` with the problems in the order of their lines, if there are any."""
-    shown = sorted(problems, key=lambda problem: problem.line)[:most]
-    if len(problems) > most:
-        shown.append(Problem(f"and {len(problems) - most} problems more", file=str(path)))
-    raise_all(LayoutError, shown)
+    in_order = sorted(problems, key=lambda problem: problem.line)
+    raise_all(LayoutError, first_of(in_order, most, str(path)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.errors import MeshError, Problem
+from quiltcli.errors import MeshError, Problem, first_of, raise_all
 from quiltcli.formats.mesh.mtl import MeshMaterial
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, segments
 
@@ -132,12 +132,7 @@ def strange_corners(
 
 def raise_problems(problems: Sequence[Problem], path: str) -> None:
     """Raise a `MeshError` with the first `MOST_PROBLEMS` problems and the count of the rest."""
-    if not problems:
-        return
-    shown = list(problems[:MOST_PROBLEMS])
-    if len(problems) > MOST_PROBLEMS:
-        shown.append(Problem(f"and {len(problems) - MOST_PROBLEMS} problems more", path))
-    raise MeshError(shown)
+    raise_all(MeshError, first_of(problems, MOST_PROBLEMS, path))
 
 
 def one_face_groups(group: IntArray, names: Sequence[str]) -> tuple[str, ...]:

@@ -41,7 +41,7 @@ def draw_frame(
     dirty: BoolArray | None = None,
     crew: Crew | None = None,
 ) -> FrameRecord:
-    """Draw what the viewer sees on every lit facet, by the job's method; see `draw.draw_frame`."""
+    """Draw what the viewer sees on every lit facet, by the job's method; see `frame.draw_frame`."""
     other = OTHERS.get(stage.job.render.method)
     if other is not None:
         return other(stage, viewer, buffers, threads, only)

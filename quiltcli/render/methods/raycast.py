@@ -40,7 +40,7 @@ RESOLUTION = 2.0**-30
 def cast_frame(
     stage: Stage, viewer: Viewer, buffers: Buffers, threads: int = 1, only: BoolArray | None = None
 ) -> FrameRecord:
-    """Draw a frame by casting rays; for the arguments see `draw.draw_frame`.
+    """Draw a frame by casting rays; for the arguments see `frame.draw_frame`.
 
     Raises:
         MissingExtraError: there is no Embree on this machine.

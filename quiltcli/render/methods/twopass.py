@@ -34,7 +34,7 @@ _AROUND = ((0, 0), (1, 0), (0, 1), (1, 1))
 def draw_twice(
     stage: Stage, viewer: Viewer, buffers: Buffers, threads: int = 1, only: BoolArray | None = None
 ) -> FrameRecord:
-    """Draw a frame in two passes; for the arguments see `draw.draw_frame`.
+    """Draw a frame in two passes; for the arguments see `frame.draw_frame`.
 
     Pixels outside the viewer's frustum, which opens to 120° at most, stay empty.
     """

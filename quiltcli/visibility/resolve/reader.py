@@ -52,7 +52,7 @@ class TileRays:
 
     Attributes:
         vectors: d, of any length, from the eye.
-        along: (3, n) planes, on grids (`vectors.grid_values`), of the depth of d; None where it is radial.
+        along: (3, n) planes, on grids (`grids.grid_values`), of the depth of d; None where it is radial.
         axes: (3, 3, n) planes, on grids, of d by axis; none where neither depth nor position needs them.
         placed: whether positions are wanted.
     """

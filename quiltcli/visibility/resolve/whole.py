@@ -41,7 +41,7 @@ class WholeTiles:
         pair: (G,) the pairs, rows of the canvas's planes.
         triangle: (G,) triangle index.
         rays: rays through their pixels.
-        inverse: (3, G) planes of 1/t on grids (`vectors.grid_values`), from their first pixels.
+        inverse: (3, G) planes of 1/t on grids (`grids.grid_values`), from their first pixels.
         normal: normals on the side of the eye, of any length; None unless wanted.
         weights: (3, 3, G) planes, on grids, of the second and third edge function and of the sum of all;
             none unless wanted, (0, 3, G).
