@@ -61,7 +61,7 @@ def piece(
     """The raster of the facet in this row of the layout; `owners` are `pixel_owners(layout)`."""
     here = facet_image({"id": owners}, layout, row, owners)["id"] == layout.facet[row]
     width, height = layout.size[row]
-    polygon = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    polygon = layout.outline(row)
     return Piece(int(layout.facet[row]), name, (int(width), int(height)), polygon, here, step)
 
 

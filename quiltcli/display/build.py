@@ -14,7 +14,7 @@ from quiltcli.display.rasters import LEVEL, MOST_PIXELS, Rasters, axes, into_pla
 from quiltcli.errors import DisplayError, Problem, first_of, raise_all
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
 from quiltcli.formats.mesh.polygons import area_vectors
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, dot, normalized
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, applied, dot, normalized
 from quiltcli.job.display import DisplayFile, FacetSpec, ResolutionSpec
 from quiltcli.job.model import FARTHEST
 
@@ -106,7 +106,7 @@ def _in_world(mesh: PolygonMesh, spec: DisplayFile) -> FloatArray:
         matrix = spec.world_from_local
         if matrix is None:
             return corners
-        return np.stack([dot(corners, row[:3]) + row[3] for row in matrix[:3]], axis=1)
+        return applied(matrix[:3, :3], corners) + matrix[:3, 3]
 
 
 def _axes(

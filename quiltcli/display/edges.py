@@ -7,7 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.display.weld import tolerance, weld
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, dot, next_in_row, offsets, segments
+from quiltcli.geometry import (
+    BoolArray,
+    FloatArray,
+    Int32Array,
+    IntArray,
+    dot,
+    next_in_row,
+    offsets,
+    segments,
+    shares,
+)
 
 _PAIRS_AT_ONCE = 2_000_000
 
@@ -119,17 +129,12 @@ def _points_on(points: FloatArray, ends: IntArray, close: float) -> tuple[IntArr
     begin = np.searchsorted(along, low - close)
     count = np.searchsorted(along, high + close, side="right") - begin
     found = [(np.empty(0, np.int64), np.empty(0, np.int64))]
-    total = np.cumsum(count)
-    first = 0
-    while first < len(ends):
-        done = total[first - 1] if first else 0
-        last = max(first + 1, int(np.searchsorted(total, done + _PAIRS_AT_ONCE, side="right")))
-        edge, rank = segments(offsets(count[first:last]))
-        edge = edge + first
+    for part in shares(count, _PAIRS_AT_ONCE):
+        edge, rank = segments(offsets(count[part]))
+        edge = edge + part.start
         point = order[begin[edge] + rank]
         on = _inside(points[ends[edge, 0]], points[ends[edge, 1]], points[point], close)
         found.append((edge[on], point[on]))
-        first = last
     return np.concatenate([e for e, _ in found]), np.concatenate([p for _, p in found])
 
 

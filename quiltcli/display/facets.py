@@ -179,10 +179,11 @@ def convex_parts(facets: Facets) -> tuple[Int32Array, IntArray, Int32Array]:
         part_corners (M,) int32 indices into `facets.corners`, in the winding of the mesh.
     """
     start = facets.corner_start
-    whole = polygons.convex(polygons.plane_coordinates(facets.corners, start), start)
+    points = polygons.plane_coordinates(facets.corners, start)
+    whole = polygons.convex(points, start)
     if whole.all():
         return np.arange(facets.count, dtype=np.int32), start, np.arange(start[-1], dtype=np.int32)
-    triangles, owner = triangulate(facets)
+    triangles, owner = polygons.triangulate(points, start)
     cut = ~whole[owner]
     facet = np.concatenate((np.flatnonzero(whole), owner[cut]))
     order = np.argsort(facet, kind="stable")

@@ -11,7 +11,7 @@ from quiltcli.display.check import called, check_polygons
 from quiltcli.display.facets import Facets, places_of
 from quiltcli.display.rasters import MOST_PIXELS
 from quiltcli.errors import DisplayError, Problem, raise_all
-from quiltcli.geometry import FloatArray, cross, dot, normalized
+from quiltcli.geometry import FloatArray, applied, cross, dot, normalized
 from quiltcli.job.display import DisplayFile, PanelSpec
 from quiltcli.job.lengths import exact_metres
 
@@ -84,7 +84,7 @@ def _half_axes(spec: DisplayFile) -> tuple[FloatArray, FloatArray, FloatArray]:
     placed = [_half_axes_of(panel, spec) for panel in spec.panels or ()]
     middle, right, up = (np.array(rows) for rows in zip(*placed, strict=True))
     matrix = spec.transform.array if spec.transform is not None else np.eye(4)
-    middle, right, up = (_mapped(matrix, rows) for rows in (middle, right, up))
+    middle, right, up = (applied(matrix[:3, :3], rows) for rows in (middle, right, up))
     return middle + matrix[:3, 3], right, up
 
 
@@ -96,11 +96,6 @@ def _half_axes_of(panel: PanelSpec, spec: DisplayFile) -> tuple[FloatArray, Floa
     # Yaw 0 faces the world's +Z whichever axis is up, so only the place need be told anew.
     middle = np.array((x, z, -y) if spec.up_axis == "z" else (x, y, z))
     return middle, width * right, height * up
-
-
-def _mapped(matrix: FloatArray, rows: FloatArray) -> FloatArray:
-    """Directions (F, 3) through the linear part of a matrix, every sum in a fixed order."""
-    return np.stack([dot(rows, row[:3]) for row in matrix[:3]], axis=1)
 
 
 def _impossible_sizes(spec: DisplayFile) -> Iterator[Problem]:

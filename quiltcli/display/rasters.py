@@ -19,9 +19,11 @@ from quiltcli.geometry import (
     IntArray,
     cross,
     dot,
+    next_in_row,
     normalized,
     offsets,
     segments,
+    shares,
 )
 
 MOST_PIXELS = 65536  # a side
@@ -83,7 +85,7 @@ def axes(
         up: (F, 3) unit directions in the planes.
     """
     row, _ = segments(start)
-    following = _following(corners, start)
+    following = corners[next_in_row(start)]
     edge = normalized(into_plane(following - corners, normal[row]))
     side = cross(normal[row], edge)
     area = _rectangle_areas(corners, start, edge, side)
@@ -99,32 +101,21 @@ def axes(
     return cross(top, normal), -top
 
 
-def _following(corners: FloatArray, start: IntArray) -> FloatArray:
-    result = np.roll(corners, -1, axis=0)
-    result[start[1:] - 1] = corners[start[:-1]]
-    return result
-
-
 def _rectangle_areas(corners: FloatArray, start: IntArray, edge: FloatArray, side: FloatArray) -> FloatArray:
     """Area (C,) of each polygon's bounding rectangle along each of its edges."""
     row, _ = segments(start)
     count = np.diff(start)[row]
-    total = np.cumsum(count)
     area = np.empty(len(row))
-    begin = 0
-    while begin < len(row):
-        done = total[begin - 1] if begin else 0
-        end = max(begin + 1, int(np.searchsorted(total, done + _PAIRS_AT_ONCE, side="right")))
-        own = offsets(count[begin:end])
+    for part in shares(count, _PAIRS_AT_ONCE):
+        own = offsets(count[part])
         which, rank = segments(own)
-        facet = row[begin:end][which]
+        facet = row[part][which]
         local = corners[start[facet] + rank] - corners[start[facet]]
-        extent = np.ones(end - begin)
-        for axis in (edge[begin:end], side[begin:end]):
+        extent = np.ones(own.size - 1)
+        for axis in (edge[part], side[part]):
             along = dot(local, axis[which])
             extent = extent * (np.maximum.reduceat(along, own[:-1]) - np.minimum.reduceat(along, own[:-1]))
-        area[begin:end] = extent
-        begin = end
+        area[part] = extent
     return area
 
 

@@ -120,6 +120,29 @@ def slices(first: int, last: int, step: int) -> Iterator[slice]:
         yield slice(at, min(at + step, last))
 
 
+def shares(costs: FloatArray | IntArray, most: float) -> Iterator[slice]:
+    """Consecutive slices of things with these costs (n,): each costs at most `most`, or is of one thing."""
+    total, first = np.cumsum(costs), 0
+    while first < total.size:
+        done = total[first - 1] if first else 0
+        last = max(first + 1, int(np.searchsorted(total, done + most, side="right")))
+        yield slice(first, last)
+        first = last
+
+
+def applied(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Matrices (..., 3, 3) applied to vectors (..., 3): a matrix product, with sums in a fixed order."""
+    terms = [vectors[..., k, None] * matrices[..., :, k] for k in range(3)]
+    result: FloatArray = terms[0] + terms[1] + terms[2]
+    return result
+
+
+def cofactors(matrices: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Cofactor matrices (..., 3, 3), which are det · inverse transpose, and determinants (...)."""
+    found = cross(np.roll(matrices, -1, axis=-2), np.roll(matrices, -2, axis=-2))
+    return found, dot(matrices[..., 0, :], found[..., 0, :])
+
+
 def offsets(counts: Sequence[int] | NDArray[np.integer[Any] | np.bool_]) -> IntArray:
     """Offsets (n+1,) of the rows of a ragged array from their lengths (n,)."""
     return np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))

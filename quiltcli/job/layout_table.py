@@ -63,6 +63,10 @@ class Places:
     pages: Int32Array
     padding: int
 
+    def outline(self, row: int) -> FloatArray:
+        """Corners (n, 2) of one facet, in facet pixels."""
+        return self.polygon[self.corner_start[row] : self.corner_start[row + 1]]
+
     def taken(self, rows: IntArray) -> Self:
         """Some of the facets, in this order, on the same pages."""
         start, corners = some_rows(self.corner_start, rows)

@@ -57,9 +57,7 @@ def _polygons(layout: Layout, facets: Facets, row: IntArray) -> FloatArray:
     """Corners in facet pixels: the layout's where it has the facet, the display's otherwise."""
     corners = corner_pixels(facets)
     for facet in np.flatnonzero(row >= 0):
-        start = layout.corner_start[row[facet]]
-        stop = layout.corner_start[row[facet] + 1]
-        corners[facets.corner_start[facet] : facets.corner_start[facet + 1]] = layout.polygon[start:stop]
+        corners[facets.corner_start[facet] : facets.corner_start[facet + 1]] = layout.outline(row[facet])
     return corners
 
 

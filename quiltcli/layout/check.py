@@ -97,7 +97,7 @@ def _bad_row(layout: Layout, row: int) -> Iterator[Problem]:
     for key in _NUMBERS:
         if not np.isfinite(getattr(layout, key)[row]).all():
             yield layout.problem(f"facet {facet} has numbers in {key} that are not finite", row, key)
-    corners = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    corners = layout.outline(row)
     if len(corners) < 3:
         message = f"facet {facet} has {len(corners)} corners; a polygon has at least 3"
         yield layout.problem(message, row, "polygon")

@@ -18,6 +18,8 @@ from quiltcli.job.layout_table import LayoutTable, Places, read_layout_table
 from quiltcli.layout.check import check_layout
 from quiltcli.layout.layout import Layout, Packed
 
+_COLUMNS = ("size", "quilt_from_facet", "origin", "du", "dv")
+
 
 def read_layout(path: str | Path) -> Layout:
     """Read a layout file strictly.
@@ -62,14 +64,13 @@ def file_problems(layout: Layout, path: Path) -> list[Problem]:
 
 def _plain(layout: Layout) -> dict[str, object]:
     """What the file says, as plain data."""
-    columns = ("size", "quilt_from_facet", "origin", "du", "dv")
     rows = np.flatnonzero(layout.page >= 0).tolist()
     facets = [
         {
             "id": int(layout.facet[row]),
             "page": int(layout.page[row]) + 1,
-            **{key: getattr(layout, key)[row].tolist() for key in columns},
-            "polygon": layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]].tolist(),
+            **{key: getattr(layout, key)[row].tolist() for key in _COLUMNS},
+            "polygon": layout.outline(row).tolist(),
         }
         for row in rows
     ]
@@ -131,16 +132,11 @@ def _packed_lines(layout: Layout) -> Iterator[str]:
 
 
 def _facet_lines(layout: Layout, row: int) -> list[str]:
-    polygon = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
     return [
         f"- id: {layout.facet[row]}",
         f"  page: {layout.page[row] + 1}",
-        f"  size: {_flow(layout.size[row])}",
-        f"  quilt_from_facet: {_flow(layout.quilt_from_facet[row])}",
-        f"  origin: {_flow(layout.origin[row])}",
-        f"  du: {_flow(layout.du[row])}",
-        f"  dv: {_flow(layout.dv[row])}",
-        f"  polygon: {_flow(polygon)}",
+        *(f"  {key}: {_flow(getattr(layout, key)[row])}" for key in _COLUMNS),
+        f"  polygon: {_flow(layout.outline(row))}",
     ]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import LayoutError
 from quiltcli.formats.capacity import bytes_text, free_memory
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, offsets, segments
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, offsets, segments, shares
 from quiltcli.layout.layout import Layout, quilt_polygons
 from quiltcli.layout.spans import Spans, facet_spans, overlaps, snapped
 
@@ -98,14 +98,8 @@ def _add_bleed(layout: Layout, owners: Owners, bleed: float) -> None:
     """
     edges = _edges(layout)
     length = np.abs(edges.b - edges.a).max(axis=1, initial=0) + 2 * bleed + 2
-    cost = np.cumsum(np.ceil(length * (2 * bleed + 2)))
-    found = []
-    batch = 0
-    while batch < cost.size:
-        done = cost[batch - 1] if batch else 0.0
-        end = max(batch + 1, int(np.searchsorted(cost, done + _BATCH)))
-        found.append(_candidates(edges, slice(batch, end), owners, bleed))
-        batch = end
+    cost = np.ceil(length * (2 * bleed + 2))
+    found = [_candidates(edges, batch, owners, bleed) for batch in shares(cost, _BATCH)]
     if found:
         address, _, facet = _nearest(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
         owners[address] = -facet

@@ -40,8 +40,7 @@ def quilt_rays(layout: Layout, lit: BoolArray, eye: FloatArray) -> QuiltRays:
     """Rays of `eye` through every facet's place in the quilt.
 
     Args:
-        facets: the display, F facets.
-        layout: their places, one row a facet.
+        layout: the facets' places, one row a facet.
         lit: (F,) facets whose lit side faces the eye.
         eye: (3,) world metres.
     """

@@ -114,4 +114,6 @@ def fill_tables(scene: Scene, part: slice) -> None:
     """Work out the tables of some triangles of a scene that has moved."""
     triangles = scene.triangles[part]
     scene.planes[:, part] = planes_of(scene.vertices, triangles)
-    scene.corner_normals[part] = corner_normals_of(scene.vertices, triangles, scene.normals, scene.flat[part])
+    scene.corner_normals[part] = corner_normals_of(
+        scene.planes[:, part], triangles, scene.normals, scene.flat[part]
+    )

@@ -67,7 +67,7 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
     triangles, owner = triangles[keep], owner[keep]
 
     given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
-    colors, uv = _given_colors(parts), _given_uv(parts)
+    colors, uv = _given_colors(parts), given_uv(parts)
     source, triangles, normals, group = _with_normals(
         vertices,
         triangles,
@@ -149,7 +149,8 @@ def _given_colors(parts: Sequence[Part]) -> Float32Array | None:
     )
 
 
-def _given_uv(parts: Sequence[Part]) -> FloatArray | None:
+def given_uv(parts: Sequence[Part] | Sequence[Baked]) -> FloatArray | None:
+    """Texture coordinates (V, 2) of all, NaN where some have none; None where none has."""
     if all(part.uv is None for part in parts):
         return None
     return np.concatenate([np.full((len(p.vertices), 2), np.nan) if p.uv is None else p.uv for p in parts])

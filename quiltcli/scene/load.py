@@ -11,8 +11,8 @@ import numpy as np
 
 from quiltcli.errors import Problem, SceneError, counted, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
-from quiltcli.geometry import Float32Array, FloatArray
-from quiltcli.scene.bake import Baked
+from quiltcli.geometry import Float32Array
+from quiltcli.scene.bake import Baked, given_uv
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.gltf import FileLight, GltfModel, Playing, contested_channels
 from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point
@@ -186,7 +186,7 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         materials=material_table(list(gathered.surfaces)),
         lights=lights_in(lights, gathered.lights),
         background=np.array(background, dtype=np.float32),
-        uv=_uv(baked),
+        uv=given_uv(baked),
         coverage=gathered.coverage,
         notices=_notices(gathered, lights),
     )
@@ -194,12 +194,6 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
 
 def _colors(baked: Baked) -> Float32Array:
     return np.ones(baked.vertices.shape, np.float32) if baked.colors is None else baked.colors
-
-
-def _uv(baked: Sequence[Baked]) -> FloatArray | None:
-    if all(b.uv is None for b in baked):
-        return None
-    return np.concatenate([np.full((len(b.vertices), 2), np.nan) if b.uv is None else b.uv for b in baked])
 
 
 def _notices(gathered: _Gathered, lights: Sequence[LightSpec]) -> tuple[str, ...]:

@@ -9,8 +9,7 @@ import numpy as np
 from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.scene.bake import Baked, reposed
 from quiltcli.scene.importers.gltf import GltfModel, Playing, pose
-from quiltcli.scene.importers.part import Part, placed
-from quiltcli.scene.materials import Surface
+from quiltcli.scene.importers.part import moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +35,3 @@ class Mover:
             vertices, given = moved(self.matrix, vertices, normals)
             normals = np.zeros_like(vertices) if given is None else given
         return reposed(self.baked, vertices, normals)
-
-
-def moved(
-    matrix: FloatArray, vertices: FloatArray, normals: FloatArray
-) -> tuple[FloatArray, FloatArray | None]:
-    """Vertices and normals (V, 3) moved by an affine (4, 4) matrix; None for normals that it flattens."""
-    nothing = np.empty((0, 3), dtype=np.int64)
-    part = placed(Part(vertices, nothing, normals, None, Surface()), matrix)
-    return part.vertices, part.normals

@@ -18,9 +18,9 @@ from quiltcli.job.sequence import MeshSequence, numbered
 from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.gltf import FileLight, Playing, gltf_lights, gltf_parts
-from quiltcli.scene.importers.part import Part, placed
+from quiltcli.scene.importers.part import Part, moved, placed
 from quiltcli.scene.materials import Surface
-from quiltcli.scene.movers import Mover, moved
+from quiltcli.scene.movers import Mover
 
 if TYPE_CHECKING:
     from quiltcli.job.scene import ObjectSpec

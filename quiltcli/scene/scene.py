@@ -108,7 +108,7 @@ class Scene:
         The first corner's normal, what to add to it for the second and the third corner, and the
         triangle's own unit normal. Flat triangles have their own normal at all corners.
         """
-        return corner_normals_of(self.vertices, self.triangles, self.normals, self.flat)
+        return corner_normals_of(self.planes, self.triangles, self.normals, self.flat)
 
     @cached_property
     def corner_colors(self) -> Float32Array | None:
@@ -135,12 +135,11 @@ def planes_of(vertices: FloatArray, triangles: Int32Array) -> FloatArray:
 
 
 def corner_normals_of(
-    vertices: FloatArray, triangles: Int32Array, normals: Float32Array, flat: BoolArray
+    planes: FloatArray, triangles: Int32Array, normals: Float32Array, flat: BoolArray
 ) -> Float32Array:
-    """`Scene.corner_normals` (T, 12) of triangles (T, 3), some of which (T,) are flat."""
+    """`Scene.corner_normals` (T, 12) of triangles (T, 3) in planes (4, T), some of which (T,) are flat."""
     table = np.empty((len(triangles), 12), dtype=np.float32)
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    own = normalized(cross(b - a, c - a)).astype(np.float32)
+    own = normalized(planes[:3].T).astype(np.float32)
     table[:, 0:9] = _corner_table(normals, triangles)
     table[:, 9:12] = own
     alone = np.flatnonzero(flat)

@@ -72,7 +72,7 @@ def _numbers(values: Sequence[float] | FloatArray) -> str:
 
 def world_corners(layout: Layout, row: int) -> FloatArray:
     """World positions (n, 3) of a facet's corners by the layout's raster."""
-    corners = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    corners = layout.outline(row)
     result: FloatArray = (
         layout.origin[row] + corners[:, :1] * layout.du[row] + corners[:, 1:] * layout.dv[row]
     )

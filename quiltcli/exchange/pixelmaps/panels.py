@@ -54,7 +54,7 @@ def write_panels(layout: Layout, facets: Facets | None, path: Path) -> list[Path
 
 def _line(layout: Layout, facets: Facets | None, row: int) -> list[object]:
     facet, place = int(layout.facet[row]), panel(layout, row)
-    corners = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    corners = layout.outline(row)
     vectors = (number for key in (layout.origin, layout.du, layout.dv) for number in key[row].tolist())
     return [
         facet,

@@ -89,7 +89,7 @@ def page_st_map(
 
 def _window(layout: Layout, row: int) -> tuple[slice, slice]:
     """Rows and columns of the page that hold the facet's polygon."""
-    corners = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    corners = layout.outline(row)
     matrix = layout.quilt_from_facet[row]
     quilt = corners @ matrix[:, :2].T + matrix[:, 2]
     width, height = layout.pages[layout.page[row]]

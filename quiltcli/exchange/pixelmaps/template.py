@@ -53,7 +53,7 @@ def svg_template(layout: Layout, facets: Facets | None, page: int) -> str:
 def _facet(layout: Layout, row: int, label: str, name: str) -> list[str]:
     """A facet's group: polygon with a border one pixel wide inside it, id, name, arrow, corner letters."""
     (a, c, e), (b, d, f) = layout.quilt_from_facet[row]
-    polygon = layout.polygon[layout.corner_start[row] : layout.corner_start[row + 1]]
+    polygon = layout.outline(row)
     points = " ".join(f"{_short(x)},{_short(y)}" for x, y in polygon)
     fill = "#" + "".join(f"{round(255 * part):02x}" for part in facet_color(int(layout.facet[row])))
     matrix = " ".join(map(_short, (a, b, c, d, e, f)))

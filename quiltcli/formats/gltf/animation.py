@@ -13,7 +13,6 @@ from quiltcli.formats.gltf.json_values import Json
 from quiltcli.formats.gltf.model import Channel, Clip
 from quiltcli.geometry import FloatArray
 
-AFTER = ("hold", "loop", "bounce")
 _WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
 _KIND = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 # Quaternions nearer than this are joined by a chord: the arc's formula would divide by nearly nothing.

@@ -13,7 +13,7 @@ import numpy as np
 from quiltcli.formats.gltf.animation import clip_time, value_at
 from quiltcli.formats.gltf.model import Clip, Gltf, Primitive, Shape
 from quiltcli.formats.gltf.nodes import placements, product, world_placements
-from quiltcli.geometry import BoolArray, FloatArray, IntArray, cross, dot
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, applied, cofactors
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,10 +146,10 @@ def _one(gltf: Gltf, primitive: Primitive, shape: Shape, pose: Pose) -> Placed:
     blend = np.zeros((len(positions), 3, 4))
     for joint, weight in zip(primitive.joints.T, primitive.weights.T, strict=True):
         blend += weight[:, None, None] * joints[joint, :3]
-    vertices = _applied(blend[..., :3], positions) + blend[..., 3]
-    cofactors, det = _cofactors(blend[..., :3])
+    vertices = applied(blend[..., :3], positions) + blend[..., 3]
+    turned, det = cofactors(blend[..., :3])
     if normals is not None:
-        normals = _applied(cofactors, normals) * np.sign(det)[:, None]
+        normals = applied(turned, normals) * np.sign(det)[:, None]
     inside_out = np.array([np.count_nonzero(det < 0) * 2 > len(det)])
     copies = len(shape.instances)
     return Placed(
@@ -163,26 +163,13 @@ def _carried(positions: FloatArray, normals: FloatArray | None, places: FloatArr
     """Copies of vertices at places (C, 4, 4)."""
     rows = places[:, None, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
-        vertices = _applied(rows, positions[None]) + places[:, None, :3, 3]
-        cofactors, det = _cofactors(places[:, :3, :3])
+        vertices = applied(rows, positions[None]) + places[:, None, :3, 3]
+        turned, det = cofactors(places[:, :3, :3])
         if normals is not None:
             # Normals go by the inverse transpose, which a flat placement does not have.
             inverse = np.where(det == 0, 0.0, 1 / np.where(det == 0, 1, det))[:, None, None]
-            normals = _applied((cofactors * inverse)[:, None], normals[None]).reshape(-1, 3)
+            normals = applied((turned * inverse)[:, None], normals[None]).reshape(-1, 3)
     return Placed(vertices.reshape(-1, 3), normals, det < 0)
-
-
-def _applied(rows: FloatArray, points: FloatArray) -> FloatArray:
-    """Matrices (..., 3, 3) applied to points (..., 3), in a fixed order of sums."""
-    terms = [points[..., k, None] * rows[..., :, k] for k in range(3)]
-    result: FloatArray = terms[0] + terms[1] + terms[2]
-    return result
-
-
-def _cofactors(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Cofactor matrices (..., 3, 3), which are det · inverse transpose, and determinants (...)."""
-    cofactors = cross(np.roll(rows, -1, axis=-2), np.roll(rows, -2, axis=-2))
-    return cofactors, dot(rows[..., 0, :], cofactors[..., 0, :])
 
 
 def placed_triangles(piece: Piece, mirrored: BoolArray) -> IntArray:

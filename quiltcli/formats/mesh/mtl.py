@@ -248,10 +248,11 @@ def place_of(folder: Path, name: str) -> Path:
     plain = name.strip('"').replace("\\", "/")
     place = folder / plain
     beside = folder / plain.rpartition("/")[2]
-    return beside if not _there(place) and _there(beside) else place
+    return beside if not is_file(place) and is_file(beside) else place
 
 
-def _there(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that none can have has none."""
     try:
         return path.is_file()
     except (OSError, ValueError):  # a name too long, or with a zero byte in it

@@ -18,7 +18,7 @@ from quiltcli.errors import MeshError, Problem
 from quiltcli.formats.inputs import read_input
 from quiltcli.formats.mesh.colors import linear_from_srgb
 from quiltcli.formats.mesh.mesh import PolygonMesh, one_face_groups, raise_problems
-from quiltcli.formats.mesh.mtl import MeshMaterial, material_named, read_mtl, without_comment
+from quiltcli.formats.mesh.mtl import MeshMaterial, is_file, material_named, read_mtl, without_comment
 from quiltcli.formats.mesh.words import (
     Statements,
     bad_rows,
@@ -339,10 +339,7 @@ def _materials(
 def _libraries(rest: str, folder: Path) -> list[str]:
     """The files an `mtllib` names: one with blanks in its name, if there is such a one, or several."""
     whole = without_comment(rest)
-    try:
-        if (folder / whole.replace("\\", "/")).is_file():
-            return [whole]
-    except (OSError, ValueError):  # a name too long, or with a zero byte in it
-        pass
+    if is_file(folder / whole.replace("\\", "/")):
+        return [whole]
     pieces = re.findall(r".+?\.mtl(?=\s|$)", whole, re.IGNORECASE)
     return [piece.strip() for piece in pieces] if "".join(pieces) == whole else whole.split()

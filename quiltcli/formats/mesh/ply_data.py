@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from quiltcli.formats.mesh.ply_header import ElementHeader, Header, Property, StopReadingError
 from quiltcli.formats.mesh.words import Statements, bad_rows, parsed_floats, plain_text, statements
-from quiltcli.geometry import FloatArray, IntArray, offsets
+from quiltcli.geometry import FloatArray, IntArray, offsets, segments
 
 Column = NDArray[Any]
 
@@ -156,8 +156,8 @@ def _places(begin: IntArray, own: IntArray, size: int = 1) -> IntArray:
 
     `own` (n+1,) are the offsets of the lists when joined.
     """
-    rank = np.arange(own[-1]) - np.repeat(own[:-1], np.diff(own))
-    result: IntArray = np.repeat(begin, np.diff(own)) + size * rank
+    row, rank = segments(own)
+    result: IntArray = begin[row] + size * rank
     return result
 
 

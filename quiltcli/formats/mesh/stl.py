@@ -106,13 +106,14 @@ def _text(data: bytes, path: Path) -> PolygonMesh:
     assert flat is not None
     start = offsets(sizes)
     vertices = flat[start[:-1, None] + np.arange(3)].reshape(-1, 3)
-    counts, lines = _loops(rows, led, text.lines(rows))
+    vertex_lines = text.lines(rows)
+    counts, lines = _loops(rows, led, vertex_lines)
     problems = [
         Problem(f"facet {k + 1} has {counts[k]} vertices (expected 3)", str(path), int(lines[k]))
         for k in np.flatnonzero(counts < 3)
     ]
     raise_problems(problems, str(path))
-    return _mesh(vertices, counts, lines, path, None, text.lines(rows))
+    return _mesh(vertices, counts, lines, path, None, vertex_lines)
 
 
 def _without_names(text: bytes) -> bytes:

@@ -225,6 +225,8 @@ def gltf_lights(
     model: GltfModel, time: float | None = None, playing: Playing | None = None
 ) -> tuple[FileLight, ...]:
     """The lights of the file at rest, or at a time of its animations."""
+    if not model.gltf.lights:
+        return ()
     return tuple(_lights(model.gltf, _pose(model, time, playing).world))
 
 

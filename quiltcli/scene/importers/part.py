@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.geometry import Float32Array, FloatArray, IntArray, cross, dot
+from quiltcli.geometry import Float32Array, FloatArray, IntArray, applied, cofactors
 from quiltcli.scene.materials import Surface
 
 
@@ -36,26 +36,25 @@ class Part:
 
 
 def placed(part: Part, matrix: FloatArray) -> Part:
-    """The part moved by an affine (4, 4) matrix; normals by its inverse transpose.
-
-    A matrix that flattens space leaves no normals; neither do the triangles keep any area.
-    """
+    """The part moved by an affine (4, 4) matrix, as `moved`; what mirrors turns its winding inside out."""
     if np.array_equal(matrix, np.eye(4)):
         return part
+    vertices, normals = moved(matrix, part.vertices, part.normals)
+    mirrored = part.mirrored ^ bool(cofactors(matrix[:3, :3])[1] < 0)
+    return replace(part, vertices=vertices, normals=normals, mirrored=mirrored)
+
+
+def moved(
+    matrix: FloatArray, vertices: FloatArray, normals: FloatArray | None
+) -> tuple[FloatArray, FloatArray | None]:
+    """Vertices (V, 3) moved by an affine (4, 4) matrix, and normals (V, 3) by its inverse transpose.
+
+    A matrix that flattens space leaves no normals; neither do triangles keep any area.
+    """
+    if np.array_equal(matrix, np.eye(4)):
+        return vertices, normals
     rows = matrix[:3, :3]
-    # The rows of the cofactor matrix: det · inverse transpose.
-    cofactors = cross(np.roll(rows, -1, axis=0), np.roll(rows, -2, axis=0))
-    det = float(dot(rows[0], cofactors[0]))
-    return replace(
-        part,
-        vertices=_linear(rows, part.vertices) + matrix[:3, 3],
-        normals=None if part.normals is None or det == 0 else _linear(cofactors / det, part.normals),
-        mirrored=part.mirrored ^ (det < 0),
-    )
-
-
-def _linear(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    """`matrix` applied to every row, in a fixed order of sums: a matrix product has none."""
-    columns = (points[:, 0:1] * matrix[:, 0], points[:, 1:2] * matrix[:, 1], points[:, 2:3] * matrix[:, 2])
-    result: FloatArray = columns[0] + columns[1] + columns[2]
-    return result
+    turned, det = cofactors(rows)
+    if normals is not None:
+        normals = None if det == 0 else applied(turned / det, normals)
+    return applied(rows, vertices) + matrix[:3, 3], normals

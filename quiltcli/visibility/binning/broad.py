@@ -13,7 +13,7 @@ from functools import reduce
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, IntArray, dot, normalized, offsets, segments
+from quiltcli.geometry import FloatArray, IntArray, dot, normalized, offsets, segments, shares
 
 _CHUNK = 1 << 20
 _NEAR_PLANE = 1e-6
@@ -107,15 +107,10 @@ def _on_face(polygons: FloatArray, frame: FloatArray, grid: _Grid, count: int) -
     areas = _areas(cells)
     result = []
     for some in (np.flatnonzero(areas == 1), np.flatnonzero(areas > 1)):
-        work = np.cumsum(areas.take(some))
-        first = 0
-        while first < some.size:
-            done = work[first - 1] if first else 0
-            last = max(int(np.searchsorted(work, done + _CHUNK // 8, side="right")), first + 1)
-            part = some[first:last]
+        for share in shares(areas.take(some), _CHUNK // 8):
+            part = some[share]
             mover, target = grid.meeting(movers.take(part), cells.take(part, axis=1))
             result.append(movers.index.take(part.take(mover)) * count + grid.targets.index.take(target))
-            first = last
     return np.concatenate(result) if result else np.zeros(0, dtype=np.int64)
 
 
