@@ -236,7 +236,8 @@ class DisplayFile(FileModel):
     viewing_side: Annotated[str, OneOf(("front", "back", "both"))] = "front"
     """Lit side: front, where the winding faces; back, seen from inside; both."""
     resolution: ResolutionSpec | None = None
-    """How many pixels the facets of a mesh have; panels have pixels of their own."""
+    """How many pixels the facets of a mesh have; panels have pixels of their own, and where `layout` is given
+    the texture coordinates tell."""
     facets: dict[Count, FacetSpec] = Field(default_factory=dict)
     """What is different on single facets, by facet id."""
     transform: TransformSpec | None = None
@@ -263,8 +264,11 @@ class DisplayFile(FileModel):
             yield ("mesh",), "missing key (polygon mesh; or panels: flat rectangles)"
         elif self.mesh is not None and self.panels is not None:
             yield ("panels",), "cannot stand beside mesh (expected only one of mesh or panels)"
-        if self.panels is None and self.resolution is None:
-            yield ("resolution",), "missing key (how many pixels the facets have)"
+        if self.panels is None and self.resolution is None and self.layout is None:
+            words = (
+                "missing key (how many pixels the facets have; none is needed beside layout: {from_uv: true,"
+            )
+            yield ("resolution",), f"{words} size: [W, H]}}, where texture coordinates tell)"
         if self.panels is not None:
             yield from self._beside_panels()
         if self.transform is not None and np.linalg.det(self.transform.array[:3, :3]) < 0:

@@ -210,7 +210,8 @@ CASES = [
     Case("display: size", [swap(DISPLAY, "pixels_per_metre: 32", "pixels_per_metre: 100000")], [],
          "display.yaml:3:32: resolution.pixels_per_metre: makes facet 1 (back) over 65536 × over 65536 pixels (expected 1 to 65536 a side)", "display.yaml:3:32: resolution.pixels_per_metre: makes facet 2 (right) over 65536 × over 65536 pixels (expected 1 to 65536 a side)"),
     Case("display: no resolution", [swap(DISPLAY, "resolution: {pixels_per_metre: 32}\n", "")], [],
-         "display.yaml:1:1: resolution: missing key (how many pixels the facets have)"),
+         "display.yaml:1:1: resolution: missing key (how many pixels the facets have; or layout: {from_uv: true, "
+         "size: [W, H]} for a mesh whose texture coordinates tell)"),
     Case("display: units", [swap(DISPLAY, "mesh:", "units: inch\nmesh:")], [],
          "display.yaml:2:8: units: expected m, cm, mm, in, ft or a number of metres, got the text 'inch'"),
     Case("display: all disabled", [swap(DISPLAY, "resolution:", "facets: {1: {enabled: false}, 2: {enabled: false}}\nresolution:")], [],
