@@ -265,10 +265,8 @@ class DisplayFile(FileModel):
         elif self.mesh is not None and self.panels is not None:
             yield ("panels",), "cannot stand beside mesh (expected only one of mesh or panels)"
         if self.panels is None and self.resolution is None and self.layout is None:
-            words = (
-                "missing key (how many pixels the facets have; none is needed beside layout: {from_uv: true,"
-            )
-            yield ("resolution",), f"{words} size: [W, H]}}, where texture coordinates tell)"
+            words = "missing key (how many pixels the facets have; or layout: {from_uv: true, size: [W, H]}"
+            yield ("resolution",), f"{words} for a mesh whose texture coordinates tell)"
         if self.panels is not None:
             yield from self._beside_panels()
         if self.transform is not None and np.linalg.det(self.transform.array[:3, :3]) < 0:

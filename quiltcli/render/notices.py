@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from quiltcli.display import Facets
 from quiltcli.display.notices import display_notices
@@ -10,9 +10,10 @@ from quiltcli.geometry import BoolArray
 from quiltcli.job import JobFile
 from quiltcli.job.frames import format_frames
 from quiltcli.layout import Layout
+from quiltcli.projection.camera import WIDEST, beyond_frustum
 from quiltcli.render.needs import disk_warnings
 from quiltcli.render.setup import Stage
-from quiltcli.viewer.clip import behind_words
+from quiltcli.viewer.clip import behind_words, their_lit_facets
 from quiltcli.viewer.edge_on import edge_on_notices
 from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
@@ -52,6 +53,8 @@ def job_warnings(
             "the path does not say where the head looks, on which no picture for one eye depends; depth is"
             " measured along the line to the display's middle (render.depth: radial measures the distance)"
         )
+    if job.render.method == "twopass":
+        yield from _narrow_pictures(facets, viewers_of(job, job.frames if frames is None else frames))
     yield from edge_on_notices(facets, viewers_of(job, job.frames if frames is None else frames))
     others = sorted(set(frames or ()) - set(job.frames))
     if others:
@@ -61,3 +64,14 @@ def job_warnings(
     yield from disk_warnings(job, layout, frames)
     if not has_embree():
         yield "embreex is not installed: triangles are sorted to facets without it, which takes longer"
+
+
+def _narrow_pictures(facets: Facets, viewers: Iterable[Viewer]) -> Iterator[str]:
+    """Frames in which the picture of a render in two passes does not hold all lit facets."""
+    frames = [v.frame for v in viewers if beyond_frustum(v, facets, their_lit_facets(facets, v))]
+    if frames:
+        which = format_frames(sorted(set(frames)))
+        yield (
+            f"render.method twopass draws {WIDEST:.0f} degrees about the look direction: in frames {which}"
+            " lit facets reach beyond, and their pixels there stay empty (every other method draws all around)"
+        )

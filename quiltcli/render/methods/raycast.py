@@ -19,6 +19,7 @@ from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
 from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background
+from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage
 from quiltcli.shading.adaptive import Shaded
@@ -70,11 +71,12 @@ def cast_frame(
         reaching=0,
         pairs=0,
         settled=0,
+        binned=False,
         lit_facets=int(np.count_nonzero(rays.lit)),
         visible_pixels=visible,
         fill=stage.fill,
         seconds={"cast and shade": time.perf_counter() - begin},
-        warnings=() if visible else ("no pixel shows the scene",),
+        warnings=tuple(frame_warnings(stage, viewer, lit, pairs=1, visible=visible)),
     )
 
 
