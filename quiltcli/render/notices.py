@@ -72,6 +72,7 @@ def _narrow_pictures(facets: Facets, viewers: Iterable[Viewer]) -> Iterator[str]
     if frames:
         which = format_frames(sorted(set(frames)))
         yield (
-            f"render.method twopass draws {WIDEST:.0f} degrees about the look direction: in frames {which}"
-            " lit facets reach beyond, and their pixels there stay empty (every other method draws all around)"
+            f"render.method twopass draws {WIDEST:.0f} degrees about the look direction: in frames"
+            f" {which} lit facets reach beyond, and their pixels there stay empty (every other method draws"
+            " all around)"
         )

@@ -387,7 +387,8 @@ def test_two_passes_say_what_of_a_display_around_the_eye_they_leave_empty(tmp_pa
     )
     (tmp_path / "job.yaml").write_text(
         f"quilt_job: 1\ndisplay: room.yaml\nscene: {SCENES / 'ball.obj'}\nframes: 1-2\n"
-        "viewer: {near: 0.1, far: 9, path: {keyframes: [{frame: 1, position: [0, 0, 0], look_at: [0, 0, -1]}]}}\n"
+        "viewer: {near: 0.1, far: 9, path: {keyframes:"
+        " [{frame: 1, position: [0, 0, 0], look_at: [0, 0, -1]}]}}\n"
         "render: {method: twopass, bleed: 0, depth: radial}\n"
     )
     job = load_job(tmp_path / "job.yaml")
@@ -399,12 +400,11 @@ def test_two_passes_say_what_of_a_display_around_the_eye_they_leave_empty(tmp_pa
     assert float(words[0].split(" %")[0]) == pytest.approx(share, abs=1.5)
     told = [w for w in job_warnings(job, stage.facets, stage.layout) if "twopass" in w]
     assert told == [
-        "render.method twopass draws 120 degrees about the look direction: in frames 1-2 lit facets reach beyond,"
-        " and their pixels there stay empty (every other method draws all around)"
+        "render.method twopass draws 120 degrees about the look direction: in frames 1-2 lit facets reach"
+        " beyond, and their pixels there stay empty (every other method draws all around)"
     ]
-    assert not any(
-        "outside the picture" in warning for warning in by(stage, viewer, "homography")[1].warnings
-    )
+    other = by(stage, viewer, "homography")[1]
+    assert not any("outside the picture" in words for words in other.warnings)
 
 
 def test_the_first_pass_has_as_many_pixels_as_the_lit_facets(plates) -> None:
