@@ -6,7 +6,7 @@ does not hide a viewer that looks along up.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -31,13 +31,16 @@ from quiltcli.job import (
 )
 from quiltcli.job.layout_table import LayoutTable, read_layout_table
 from quiltcli.job.model import attach
-from quiltcli.layout import align, read_layout
+from quiltcli.layout import Layout, align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
+from quiltcli.render.unseen import unseen_notices
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
-from quiltcli.viewer.view import facet_problems, view_problems
+from quiltcli.scene.source import SceneSource
+from quiltcli.viewer.clip import settled_clip
+from quiltcli.viewer.view import View, facet_problems, view_problems, views_of
 
 T = TypeVar("T")
 
@@ -98,16 +101,21 @@ class _Findings:
             if isinstance(name, str) and is_regular(path.parent / name):
                 self.check(path.parent / name)
 
-    def scene(self, path: Path, spec: SceneFile | Path | None, job: JobFile | None = None) -> Scene | None:
+    def scene(
+        self, path: Path, spec: SceneFile | Path | None, job: JobFile | None = None
+    ) -> tuple[Scene | None, SceneSource | None]:
         """Load a scene, and note what it has to say, and what it lacks in a job's frames."""
+        source = None
         if job is None or not isinstance(spec, SceneFile):
             scene = self.run(load_scene, spec)
         else:
             scene, source = self.run(load_moving_scene, spec, float(job.fps)) or (None, None)
-            self.problems += source.problems(job.frames) if source is not None else ()
+            lacking = list(source.problems(job.frames)) if source is not None else []
+            self.problems += lacking
+            source = None if lacking else source
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
-        return scene
+        return scene, source
 
     def facets(self, path: Path) -> Facets | None:
         """The facets of a display file, built once."""
@@ -165,9 +173,27 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.run(read_layout, choice)
     if facets is not None:
         findings.problems += facet_problems(job, facets.count)
-    scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
-    if facets is not None and not found:
-        findings.notices += stereo_notices(job, facets, scene)
+    before = len(findings.problems)
+    scene, source = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
+    if facets is None or found:
+        return
+    findings.notices += stereo_notices(job, facets, scene)
+    if len(findings.problems) == before:
+        views = views_of(job, job.frames, settled_clip(job, facets))
+        at = None if scene is None else source.scene_at if source is not None else lambda frame: scene
+        findings.notices += findings.run(lambda: list(_unseen(job, views, facets, placed, at))) or []
+
+
+def _unseen(
+    job: JobFile,
+    views: list[View],
+    facets: Facets,
+    layout: Layout | None,
+    scene_at: Callable[[float], Scene] | None,
+) -> Iterator[str]:
+    """Why views of a job show nothing, as far as it can be said of what is there."""
+    how = job.render
+    yield from unseen_notices(views, facets, layout, scene_at, bleed=how.bleed, culling=how.backface_culling)
 
 
 def _job_alone(path: Path) -> JobFile | None:

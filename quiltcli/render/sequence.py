@@ -44,6 +44,7 @@ from quiltcli.render.outputs import (
 from quiltcli.render.report import FrameRecord, write_report
 from quiltcli.render.resume import clear_away, unfinished
 from quiltcli.render.setup import Stage, set_stage
+from quiltcli.render.unseen import unseen_in
 from quiltcli.render.workers import Pool, can_fork, shared_buffers, worth_forking
 from quiltcli.viewer.view import View, by_file, views_of
 
@@ -131,6 +132,8 @@ def render(
     for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage, options.frames)):
         listener.say(notice)
     if options.dry_run:
+        for notice in unseen_in(ready.stage, ready.views):
+            listener.say(notice)
         return []
     clear_away(ready.stage, ready.out, ready.views)
     if not ready.views:

@@ -33,6 +33,7 @@ from quiltcli.projection.camera import aimed, camera_display, frame_display
 from quiltcli.render.crew import default_threads
 from quiltcli.render.notices import stage_warnings
 from quiltcli.render.setup import Stage, set_stage
+from quiltcli.render.unseen import unseen_in
 from quiltcli.viewer.view import views_of
 from quiltcli.viewer.viewer import Viewer
 
@@ -128,6 +129,8 @@ def simulate(
     views = [view for view in stage.views(frames) if options.eye in ("", view.eye)]
     if not views:
         raise JobError(f"--eye {options.eye}: the job has one eye (viewer.stereo gives it two)")
+    for notice in unseen_in(stage, views):
+        say(notice)
     # Frame by frame and viewer by viewer, the left eye before the right.
     seen = [(view, number) for view in views for number in range(len(view.viewers))]
     for view, number in sorted(seen, key=lambda item: (item[0].frame, item[1])):

@@ -77,7 +77,9 @@ class Verdict:
         """The verdict in a few words."""
         if not self.lit and self.passed:
             return "nothing to verify, no facet is lit"
-        return "within tolerance" if self.passed else "OUT OF TOLERANCE"
+        if not self.passed:
+            return "OUT OF TOLERANCE"
+        return "within tolerance" + ("" if self.inside["covered"] else ", but no pixel shows the scene")
 
     @property
     def faults(self) -> tuple[Fault, ...]:
