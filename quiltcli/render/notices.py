@@ -15,6 +15,7 @@ from quiltcli.render.needs import disk_warnings
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words, their_lit_facets
 from quiltcli.viewer.edge_on import edge_on_notices
+from quiltcli.viewer.recorded.head import take_notices
 from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import has_embree
@@ -56,6 +57,9 @@ def job_warnings(
     if job.render.method == "twopass":
         yield from _narrow_pictures(facets, viewers_of(job, job.frames if frames is None else frames))
     yield from edge_on_notices(facets, viewers_of(job, job.frames if frames is None else frames))
+    for spec in job.people.values():
+        if spec.path.recorded is not None:
+            yield from take_notices(spec.path.recorded)
     others = sorted(set(frames or ()) - set(job.frames))
     if others:
         known = format_frames(job.frames)
