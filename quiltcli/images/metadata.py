@@ -33,14 +33,15 @@ def viewer_attributes(view: View, facet: int, fps: Fraction, job_sha: str, versi
 
 def _told(viewer: Viewer) -> dict[str, object]:
     """A viewer for programs, in numbers that read back exactly."""
+    facets = None if viewer.facets is None else list(viewer.facets)
+    return {"name": viewer.name, "facets": facets, **_pose(viewer)}
+
+
+def _pose(viewer: Viewer) -> dict[str, object]:
+    """Where a viewer is and what near and far are, in numbers that read back exactly."""
     places = {"eye": viewer.eye, "look": viewer.look, "up": viewer.up, "head": viewer.head}
-    return {
-        "name": viewer.name,
-        "facets": None if viewer.facets is None else list(viewer.facets),
-        **{name: place.tolist() for name, place in places.items() if place is not None},
-        "near": viewer.near,
-        "far": viewer.far,
-    }
+    known = {name: place.tolist() for name, place in places.items() if place is not None}
+    return {**known, "near": viewer.near, "far": viewer.far}
 
 
 def _attributes(view: View, viewer: Viewer, fps: Fraction, job_sha: str, version: str) -> dict[str, object]:
@@ -53,6 +54,7 @@ def _attributes(view: View, viewer: Viewer, fps: Fraction, job_sha: str, version
         "quilt:near": float(viewer.near),
         "quilt:far": float(viewer.far),
         "quilt:depth": viewer.depth,
+        "quilt:pose": json.dumps(_pose(viewer)),
         "quilt:job": job_sha,
         "quilt:version": version,
     }

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 from quiltcli.display import Facets
 from quiltcli.display.notices import display_notices
 from quiltcli.geometry import BoolArray
-from quiltcli.job import JobFile
+from quiltcli.job import JobFile, PackSpec
 from quiltcli.job.frames import format_frames
 from quiltcli.layout import Layout
 from quiltcli.projection.camera import WIDEST, beyond_frustum
@@ -44,9 +45,12 @@ def job_warnings(
     """The same of a job of which nothing is set up yet but its display and its layout."""
     yield from display_notices(facets)
     if job.render.bleed > layout.padding:
+        bleed, padding = job.render.bleed, layout.padding
+        wider = f"set layout.padding to {bleed}" if isinstance(job.layout, PackSpec) else ""
+        wider = f"pack it with --padding {bleed}" if isinstance(job.layout, Path) else wider
         yield (
-            f"the bleed of {job.render.bleed} pixels is wider than the layout's padding of"
-            f" {layout.padding}: neighbours share what lies between them"
+            f"the bleed of {bleed} pixels is wider than the layout's padding of {padding}: neighbours share"
+            f" what lies between them ({f'{wider}, or ' * bool(wider)}set render.bleed to {padding})"
         )
     viewers = viewers_of(job, job.frames[:1])
     if job.render.depth == "planar" and not all(viewer.aimed for viewer in viewers):

@@ -146,7 +146,7 @@ def test_what_is_no_archive_of_numbers(path):
     ("old", "new", "expected"),
     [
         ("columns: ", "facets: []\ncolumns: ", "facets: expected at least 1"),
-        ("columns: ", "#", "no facets (expected facets, or columns with a file that has them)"),
+        ("columns: ", "#", "facets: missing key (places of the facets)"),
     ],
 )
 def test_facets_stand_in_one_place(path, old, new, expected):

@@ -13,7 +13,7 @@ from quiltcli.display import Facets, build_facets, load_display
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.exchange.newjob import texts
 from quiltcli.exchange.newjob.figures import length_text
-from quiltcli.exchange.newjob.kinds import Ball, Panel, Wishes, kind_of
+from quiltcli.exchange.newjob.kinds import Ball, Panel, Wishes, check_wishes, kind_of
 from quiltcli.exchange.newjob.plan import PAPER, draw_plan
 from quiltcli.exchange.newjob.stand import Stand, stand_for
 from quiltcli.formats.drawing.png import write_png
@@ -56,6 +56,7 @@ def new_job(wishes: Wishes, folder: Path) -> NewJob:
         JobError: figures that cannot be read, or that make no display.
         DisplayError, LayoutError: panels that are no facets, or do not fit the canvas.
     """
+    check_wishes(wishes)
     frames = parse_frames(wishes.frames)
     content = _content(wishes, folder)
     files, facets = _display(wishes, kind_of(wishes).build(wishes), folder)

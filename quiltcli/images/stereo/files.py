@@ -196,7 +196,7 @@ def _channels(light: Float32Array) -> dict[str, Float32Array]:
 
 def _attributes(image: Image, options: StereoOptions) -> dict[str, object]:
     """What is true of the new image, too: all but what told one eye from the other."""
-    apart = ("view", "multiView", "quilt:eye")
+    apart = ("view", "multiView", "quilt:eye", "quilt:pose")
     kept = {name: value for name, value in image.attributes.items() if name not in apart}
     return kept | {"quilt:stereo": options.mode}
 

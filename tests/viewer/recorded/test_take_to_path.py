@@ -264,3 +264,23 @@ def test_keyframes_with_orientations_turn_evenly() -> None:
         expected = Rotation.from_rotvec([0, math.radians(20), 0]).apply([0, 0, -1])
         assert viewer.look == pytest.approx(expected, abs=1e-12)
         assert viewer.up == pytest.approx([0, 1, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("names", "row", "words"),
+    [
+        ("time|x|y|z", "0|1|2|3", "F:1:1: the columns are separated by bars (expected commas, "),
+        ("time x y z", "0 0,1 2,5 3,5", "F:1:1: the columns are separated by blanks (expected commas, "),
+        ("time;x;y;z", "0,1,2,3", "F:2:1: columns separated by commas under names separated by semicolons "),
+        ("time,x,y,z", "0;1,5;2,5;3", "F:2:1: columns separated by semicolons under names separated by "),
+        ("time,x,y,z", "0,0,1,2,5,3,5", "F:2:1: 7 cells under 4 names: are commas decimal points here? "),
+    ],
+)  # fmt: skip
+def test_what_separates_columns_is_told_by_its_name(names: str, row: str, words: str, tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, f"{names}\n{row}\n")
+    assert message(spec, 1).startswith(words)
+
+
+def test_tabs_may_stand_beside_decimal_commas(tmp_path: Path) -> None:
+    head = head_of(tmp_path, "time\tx\ty\tz\n0,00\t1,5\t2\t3\n0,01\t1,5\t2\t3\n")
+    assert head.take.positions.tolist() == [[1.5, 2, 3]] * 2
