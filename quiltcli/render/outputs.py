@@ -74,16 +74,14 @@ def facet_file(stage: Stage, out: Outputs, row: int, view: View) -> Path:
 
 
 def image_folders(stage: Stage, out: Outputs) -> list[Path]:
-    """The folders that hold images; no folder is for a frame alone."""
+    """The folders that hold images, those of pages first; no folder is for a frame alone."""
     job, layout = stage.job, stage.layout
-    folders = set()
-    for eye in EYES if job.is_stereo and job.output.stereo == "files" else ("",):
-        if job.output.quilts:
-            folders |= {stage.names.page(out.folder, k + 1, 0, eye).parent for k in range(len(layout.pages))}
-        if job.output.facets:
-            facets = layout.facet[out.rows].tolist()
-            folders |= {stage.names.facet(out.folder, facet, 0, eye).parent for facet in facets}
-    return sorted(folders)
+    eyes = EYES if job.is_stereo and job.output.stereo == "files" else ("",)
+    pages = range(1, len(layout.pages) + 1) if job.output.quilts else ()
+    facets = layout.facet[out.rows].tolist() if job.output.facets else []
+    files = [stage.names.page(out.folder, page, 0, eye) for page in pages for eye in eyes]
+    files += [stage.names.facet(out.folder, facet, 0, eye) for facet in facets for eye in eyes]
+    return list(dict.fromkeys(path.parent for path in files))
 
 
 def view_lit(stage: Stage, view: View) -> BoolArray:
