@@ -18,6 +18,7 @@ from pydantic import AfterValidator, Field
 from quiltcli.job.model import Complaint, Model, complaint, either, suggest
 
 _FIELD = re.compile(r"\{([^{}]*)\}")
+_HASHES = re.compile(r"#{1,9}")
 _DIGITS = re.compile(r"0[1-9]")
 _FORBIDDEN = re.compile(r'[\\:*?"<>|\x00-\x1f\x7f]')
 NUMBERS = ("page", "facet", "frame")
@@ -107,15 +108,31 @@ def read_template(text: str, kind: str) -> Template:
     Raises:
         PydanticCustomError: it makes no sense, in words.
     """
+    parts = _parts(text, kind)
+    for wrong in _faults(text, parts):
+        raise complaint(wrong)
+    return Template(tuple(parts))
+
+
+def read_pattern(text: str, kind: str) -> Template:
+    """Read a pattern of names that others have given; it need not be told back what a name was made of.
+
+    A run of # stands for the frame number, too.
+
+    Raises:
+        PydanticCustomError: it holds a field that there is not.
+    """
+    return Template(tuple(_parts(_HASHES.sub(lambda run: f"{{frame:0{len(run[0])}}}", text), kind)))
+
+
+def _parts(text: str, kind: str) -> list[str | Slot]:
+    """Texts and fields in their order."""
     parts: list[str | Slot] = []
     at = 0
     for match in _FIELD.finditer(text):
         parts += [text[at : match.start()]] * (match.start() > at) + [_slot(match[1], kind)]
         at = match.end()
-    parts += [text[at:]] * (at < len(text))
-    for wrong in _faults(text, parts):
-        raise complaint(wrong)
-    return Template(tuple(parts))
+    return parts + [text[at:]] * (at < len(text))
 
 
 def _slot(text: str, kind: str) -> Slot:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -40,11 +40,13 @@ class Outputs:
         folder: the output folder.
         job_sha: hash of the job, written into every file.
         rows: facets whose images are written, indices into the layout.
+        besides: attributes that every image has besides those of a render.
     """
 
     folder: Path
     job_sha: str
     rows: IntArray
+    besides: Attributes = field(default_factory=dict)
 
 
 def outputs(stage: Stage, folder: Path, job_sha: str, facet_ids: Iterable[int] | None = None) -> Outputs:
@@ -154,7 +156,8 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
     if how.quilts:
         for page in range(len(layout.pages)):
             path = page_file(stage, out, page, view)
-            own = [page_attributes(one.view, *told) | {"quilt:page": page + 1} for one in drawn]
+            also = {"quilt:page": page + 1} | out.besides
+            own = [page_attributes(one.view, *told) | also for one in drawn]
             yield _write_page, stage, path, page, drawn, own
     if not how.facets:
         return
@@ -163,7 +166,7 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
     apart = ~lit[out.rows] & (how.unlit != "write")
     for row in out.rows[~apart].tolist():
         facet = int(layout.facet[row])
-        where = facet_attributes(facet, maps[row])
+        where = facet_attributes(facet, maps[row]) | out.besides
         own = [viewer_attributes(one.view, facet, *told) | where for one in drawn]
         path = facet_file(stage, out, row, view)
         yield _write_facet, stage, path, row, drawn, own
@@ -173,7 +176,7 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
             if how.unlit == "skip":
                 yield _remove, paths
             else:
-                own = [page_attributes(one.view, *told) for one in drawn]
+                own = [page_attributes(one.view, *told) | out.besides for one in drawn]
                 yield _write_links, stage, rows[0], drawn, own, paths
 
 
