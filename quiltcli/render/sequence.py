@@ -135,7 +135,7 @@ def render(
         for notice in unseen_in(ready.stage, ready.views):
             listener.say(notice)
         return []
-    clear_away(ready.stage, ready.out, ready.views)
+    clear_away(ready.stage, ready.out)
     if not ready.views:
         return []
     with failing_run(of_the_disk=True):
