@@ -1,7 +1,8 @@
 """The display, its viewer and the scene as somebody else sees them.
 
 Eye, rays and display are triangles of one scene and drawn by the program's own rasterizer; what is
-seen of the display is looked up in its images. The scene itself lies over it, solid or as a ghost.
+seen of the display is looked up in its images. Walls seen from behind are glass, or nobody would see into
+a room of them. The scene itself lies over it all, solid or as a ghost.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from quiltcli.analysis.simulate.picture import (
     exact,
     first_triangles,
     mesh_scene,
+    outlined,
     picture_rays,
     with_channels,
 )
@@ -46,6 +48,7 @@ RAYS = 8
 
 _EYE, _RAY = (1.0, 0.62, 0.05), (0.95, 0.5, 0.04)
 _ASIDE, _ABOVE = math.radians(55), math.radians(22)
+_GLASS = np.float32(0.3)  # how much of a wall's back shows
 _BEFORE, _BEHIND = np.float32(0.55), np.float32(0.25)  # how much of a ghost shows
 
 
@@ -178,7 +181,10 @@ def third_person_light(
         scene: a name of `SCENES`.
         threads: batches drawn at a time.
     """
-    triangles, facet_of = triangulate(stage.facets)
+    cut, facet_of = triangulate(stage.facets)
+    back = ~lit_facets(stage.facets, camera.eye)[facet_of]
+    triangles, behind = cut[~back], cut[back]
+    facet_of, facet_behind = facet_of[~back], facet_of[back]
     reach = np.concatenate((stage.facets.corners, viewer.eye[None]))
     size = float(np.sqrt(dot(np.ptp(reach, axis=0), np.ptp(reach, axis=0))))
     thick = float(np.linalg.norm(through[0].dv[0])) * float(np.linalg.norm(reach.mean(axis=0) - camera.eye))
@@ -197,9 +203,23 @@ def third_person_light(
     light, _ = displayed_light(shown, camera, through, facet, how)
     on = np.flatnonzero(marked >= 0)
     light[:, on] = _mark_light(marks, marked[on], picture_rays(camera, through, on))
+    if len(behind):
+        walls = mesh_scene(corners, behind)
+        pane, before = first_triangles(stage, camera, through, walls, threads)
+        panes = np.where(before < depth, np.append(facet_behind, -1)[pane], -1).astype(np.int32)
+        light = _through_glass(shown, camera, through, panes, light)
     if scene != "none":
         light = _with_scene(stage, camera, through, light, depth, threads, solid=scene == "solid")
     return light, facet
+
+
+def _through_glass(
+    shown: Shown, camera: Viewer, through: Camera, facet: Int32Array, light: Float32Array
+) -> Float32Array:
+    """Light (3, P) with the backs of the facets (P,) that stand before it, −1 for none, laid over it."""
+    glass, _ = displayed_light(shown, camera, through, facet, "nearest")
+    mixed = np.where(facet >= 0, light + _GLASS * (glass - light), light).astype(np.float32)
+    return outlined(mixed, facet, int(through[1].pages[0, 0]))
 
 
 def _mark_light(marks: Marks, triangle: Int32Array, rays: FloatArray) -> Float32Array:
