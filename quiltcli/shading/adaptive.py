@@ -3,6 +3,14 @@
 Across a few pixels of one triangle light hardly ever changes in a way that a polynomial of second degree
 cannot follow. Where that is sure, colours are worked out at the nine nodes alone, and the polynomial
 between them is closer to the others than half floats can tell. Everything else is shaded pixel by pixel.
+
+    a square that one        nine nodes are       and its pixels lie on the polynomial
+    triangle fills           shaded               through them
+    ┌─────────────┐          ○──────○──────○      in x² y², x² y, … 1
+    │ · · · · · · │          │      │      │
+    │ · · · · · · │    →     ○──────○──────○      sure where the pole of every term of the
+    │ · · · · · · │          │      │      │      light is far off, as `_FAR` has it: a lamp
+    └─────────────┘          ○──────○──────○      nearby, a glint, a grazing normal
 """
 
 from __future__ import annotations

@@ -3,6 +3,15 @@
 A block is a part of one facet's rectangle on its page, at most `SIDE` pixels wide and high, so that
 pixel coordinates inside it stay small (edge functions are exact there) and its depth keys fit the
 cache. Keys are kept in microtiles: 8 × 8 pixels that are 64 neighbours in memory.
+
+    page                            a block                  its keys
+    ┌───────────────────────┐       ┌────┬────┬────┐         0 … 63 | 64 … 127 | 128 … 191
+    │   ╱‾‾╲     facet      │       │ 0  │ 1  │ 2  │         └ microtile 0, row by row
+    │ ┌╱────╲─┬────┐        │       ├────┼────┼────┤
+    │ ╱│     │╲    │        │  →    │ 3  │ 4  │ 5  │         owned: a bit for each pixel that
+    │╱_│_____│_╲___│ blocks │       └────┴────┴────┘         is the facet's or its bleed
+    └─┴┴─────┴─────┴────────┘        8 × 8 pixels each
+      └ a column that is a multiple of 8
 """
 
 from __future__ import annotations
@@ -81,6 +90,7 @@ class Blocks:
 
 def facet_rectangles(layout: Layout, bleed: int) -> IntArray:
     """Pixel rectangles (F, 4) x0, y0, x1, y1 (exclusive) of the facets with their bleed, cut to the page."""
+    # Whole pixels around the polygon and its bleed; a facet without a page has none.
     corners = quilt_polygons(layout)
     low = np.minimum.reduceat(corners, layout.corner_start[:-1], axis=0)
     high = np.maximum.reduceat(corners, layout.corner_start[:-1], axis=0)
@@ -168,6 +178,7 @@ def _owned_pixels(
     """Which pixels of all blocks' microtiles their facets own, and which of them are no bleed, as bits."""
     owned, inside = [np.zeros((0, 8), dtype=np.uint8)], [np.zeros((0, 8), dtype=np.uint8)]
     for f, w, h, first, step in zip(facet, width, height, address, stride, strict=True):
+        # Made up to whole microtiles with pixels of nobody.
         mine = np.zeros((-(-h // 8) * 8, -(-w // 8) * 8), dtype=owners.dtype)
         mine[:h, :w] = window(owners, first, step, w, h)
         polygon = mine == f + 1
@@ -293,12 +304,14 @@ _SPARE = _Spare()
 
 def _empty_keys(count: int) -> IntArray:
     """Keys (count, 64) that are 0."""
+    # Taken out of the shelf: two canvases of one thread must not have the same.
     keys, _SPARE.keys = _SPARE.keys, None
     return keys[:count] if keys is not None and len(keys) >= count else np.zeros((count, 64), dtype=np.int64)
 
 
 def give_back(canvas: Canvas) -> None:
     """Keep the memory of a canvas that nobody reads any more for the next one."""
+    # What is kept is the whole array, of which this canvas may have been a part.
     canvas.keys[canvas.touched] = 0
     _SPARE.keys = canvas.keys if canvas.keys.base is None else canvas.keys.base
 
@@ -310,6 +323,7 @@ def least_keys(canvas: Canvas, among: BoolArray | None = None) -> IntArray:
         canvas: what has been drawn.
         among: (M,) the only microtiles that are looked at, None for all; others are told to have 0.
     """
+    # Nothing can be in front of microtiles that have no pixels; untouched ones hide nothing.
     least = np.zeros(canvas.touched.size, dtype=np.int64)
     least[~canvas.used] = _NOT_SEEN
     touched = np.flatnonzero(canvas.touched if among is None else canvas.touched & among)
@@ -326,6 +340,7 @@ def ray_matrices(
     eye_from_quilt: FloatArray, blocks: Blocks, block: IntArray, sample: FloatArray | None
 ) -> FloatArray:
     """Matrices (K, 3, 3) from block pixels, whole numbers at each facet's `sample` (F, 2), to eye rays."""
+    # The first pixel's sample is moved to the origin, and pixels are whole numbers from there.
     facet = blocks.facet[block]
     matrix = eye_from_quilt[facet].copy()
     beside = np.zeros((1, 2)) if sample is None else sample[facet]

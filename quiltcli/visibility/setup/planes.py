@@ -2,7 +2,15 @@
 
 In the homogeneous pixels (X, Y, W) of a block, a triangle's three edge functions and its inverse
 depth 1/t are linear in the pixel (x, y, 1); no clipping and no division comes before them
-(Olano & Greer 1997). Their coefficients are put on grids of powers of two so that
+(Olano & Greer 1997).
+
+            C                 edge A = B × C      0 on the line through B and C, positive on A's side
+          ╱   ╲               1/t    = n / det    n = (B − A) × (C − A): the triangle's plane
+        ╱   ·   ╲             ·      covered where all three edges are positive,
+      ╱  (x, y)   ╲                  at depth t = 1 / (a·x + b·y + c)
+     A ─────────── B
+
+Their coefficients are put on grids of powers of two so that
 `a·x + b·y + c` is exact in float64 whatever the order of the sums: two triangles that share an edge
 then decide every pixel alike, and every machine computes the same bytes.
 """
@@ -131,6 +139,7 @@ def project(corners: FloatArray, matrix: FloatArray, result: FloatArray) -> Floa
     Returns:
         `result`.
     """
+    # Written out: a matrix product sums in an order of its own, another on every machine.
     x, y, z = corners[:, 0], corners[:, 1], corners[:, 2]
     part = np.empty_like(x)
     for row in range(3):
@@ -154,6 +163,7 @@ def pixel_boxes(
     A triangle that reaches behind the eye may cover all of the block; one wholly behind it, or
     beside the block, has an empty box (last < first).
     """
+    # Corners ahead of the eye are divided; of others the box is told by what is said above.
     w = homogeneous[:, 2]
     least, greatest = _extremes(w)
     front = least > _TINY
@@ -161,6 +171,7 @@ def pixel_boxes(
     scale = np.reciprocal(w if all_front else np.where(w > _TINY, w, 1.0))
     box = np.empty((4, w.shape[1]), dtype=np.int32)
     for axis, extent in ((0, width), (1, height)):
+        # A pixel is a candidate when its centre, a whole number here, lies between the extremes.
         first, last = _extremes(homogeneous[:, axis] * scale)
         np.ceil(np.subtract(first, reach + 1e-6, out=first), out=first)
         np.floor(np.add(last, reach + 1e-6, out=last), out=last)
@@ -190,15 +201,18 @@ def edge_planes(homogeneous: FloatArray, edge: FloatArray, inverse: FloatArray, 
         turn: (N,) is given the sign of the determinant, by which the edge functions were multiplied.
     """
     p, q, r = homogeneous
+    # The normal of the triangle's plane; with a corner it gives the determinant A·(B × C).
     _cross(q - p, r - p, inverse)
     determinant = p[0] * inverse[0]
     determinant += p[1] * inverse[1]
     determinant += p[2] * inverse[2]
     np.sign(determinant, out=turn)
+    # A shared edge has the same two corners, in one order or the other: the same numbers, or negated.
     for k, (start, end) in enumerate(((q, r), (r, p), (p, q))):
         _cross(start, end, edge[k])
     edge *= turn
     snap_edges(edge)
+    # Seen edge-on: all edges are 0 by now, and nothing is covered.
     determinant[turn == 0] = 1.0
     inverse /= determinant
     # Depth is measured at the place itself; only what covers it is decided on the shifted lattice.
@@ -252,10 +266,12 @@ def snap_edges(edge: FloatArray) -> None:
     the neighbour's negated plane gets the negated half step.
     """
     a, b, c = edge[..., 0, :], edge[..., 1, :], edge[..., 2, :]
+    # Adding 1.5·2⁵² steps rounds to whole steps, and taking that away leaves them.
     scale = power_of_two(np.maximum(np.abs(a), np.abs(b)))
     round_to = (scale * (1.5 * 2.0**18))[..., None, :]
     edge += round_to
     edge -= round_to
+    # The sign of a, or of b where a is 0: b's share is smaller than any step of a.
     tie = b * 2.0**-44
     tie += a
     scale *= 2.0**-35
@@ -264,6 +280,7 @@ def snap_edges(edge: FloatArray) -> None:
 
 def _snap_inverse(plane: FloatArray) -> None:
     """Put a plane of 1/t (3, N) on a grid on which sums over a block are exact, in place."""
+    # The greatest value within a block of 512 pixels decides the step, as for edges.
     a, b, c = plane
     slope = np.maximum(np.abs(a), np.abs(b))
     slope *= 512.0
