@@ -52,10 +52,11 @@ def _frames(text: str) -> tuple[int, ...]:
     return parse_frames(text)
 
 
-def _facets(text: str) -> tuple[int, ...]:
+def _facets(text: str) -> tuple[int, ...] | str:
     from quiltcli.job.frames import parse_facets
 
-    return parse_facets(text)
+    # Names are known when the display is.
+    return text if any(letter.isalpha() for letter in text) else parse_facets(text)
 
 
 def _size(text: str) -> tuple[int, int] | None:

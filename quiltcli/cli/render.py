@@ -18,7 +18,9 @@ from quiltcli.cli.printing import print_aligned
 @click.option("-o", "--output", type=PATH, help="Output folder, instead of the job's.")
 @click.option("--resume", is_flag=True, help="Skip frames that are complete and made by the same job.")
 @OVERWRITE
-@click.option("--facets", type=FACETS, help="Draw only these facets, such as 3,7-9, into existing quilts.")
+@click.option(
+    "--facets", type=FACETS, help="Draw only these facets, such as 3,7-9 or left,right, into existing quilts."
+)
 @THREADS
 @click.option(
     "--scheduler",
@@ -35,7 +37,7 @@ def render(
     output: Path | None,
     resume: bool,
     overwrite: bool,
-    facets: tuple[int, ...] | None,
+    facets: tuple[int, ...] | str | None,
     threads: int | None,
     scheduler: str | None,
     dry_run: bool,
@@ -48,10 +50,21 @@ def render(
 
     if resume and overwrite:
         raise click.UsageError("--resume keeps finished frames and --overwrite replaces them: give one")
-    options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run)
-    records = _render(load_job(job, sets), options, scheduler)
+    loaded = load_job(job, sets)
+    ids = _named(loaded, facets) if isinstance(facets, str) else facets
+    options = RenderOptions(frames, output, resume, overwrite, ids, threads or 0, dry_run)
+    records = _render(loaded, options, scheduler)
     if profile and records:
         _print_profile(records)
+
+
+def _named(job: Any, text: str) -> tuple[int, ...]:
+    """Ids of facets that are given by name."""
+    from quiltcli.display import load_display
+    from quiltcli.display.named import facet_ids
+    from quiltcli.job import load_display_file
+
+    return facet_ids(text, load_display(load_display_file(job.display)).names)
 
 
 def _render(job: Any, options: Any, scheduler: str | None) -> Any:
