@@ -19,6 +19,7 @@ COMMANDS = (
     "contact",
     "diff",
     "export",
+    "film",
     "import",
     "info",
     "new",
