@@ -27,6 +27,7 @@ from quiltcli.cli.printing import print_aligned
     " files at the same paths.",
 )
 @click.option("--dry-run", is_flag=True, help="Find every problem, write nothing.")
+@click.option("--strict", is_flag=True, help="Refuse what would only be worth a second look.")
 @click.option("--profile", is_flag=True, help="Say where the time went, by stage.")
 @SETS
 def render(
@@ -39,6 +40,7 @@ def render(
     threads: int | None,
     scheduler: str | None,
     dry_run: bool,
+    strict: bool,
     profile: bool,
     sets: tuple[str, ...],
 ) -> None:
@@ -48,7 +50,7 @@ def render(
 
     if resume and overwrite:
         raise click.UsageError("--resume keeps finished frames and --overwrite replaces them: give one")
-    options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run)
+    options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run, strict)
     records = _render(load_job(job, sets), options, scheduler)
     if profile and records:
         _print_profile(records)
