@@ -36,6 +36,7 @@ from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
+from quiltcli.render.setup import facets_and_layout
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.viewer.view import facet_problems, view_problems
@@ -161,6 +162,8 @@ def _check_job(findings: _Findings, path: Path) -> None:
     findings.problems += found
     facets = findings.facets(job.display)
     choice = job.layout or (load_display_file(job.display).layout if facets else None) or PackSpec()
+    if facets is not None and job.render.scale != 1:
+        facets, choice = facets_and_layout(job)
     placed = findings.run(layout_for, choice, facets, layout_path(job.output.directory))
     if placed is not None:
         findings.run(demand_memory, job, placed)

@@ -19,6 +19,7 @@ COMMANDS = (
     "contact",
     "diff",
     "export",
+    "farm",
     "film",
     "import",
     "info",
