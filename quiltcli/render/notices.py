@@ -12,7 +12,7 @@ from quiltcli.job import JobFile, PackSpec
 from quiltcli.job.frames import format_frames
 from quiltcli.layout import Layout
 from quiltcli.projection.camera import WIDEST, beyond_frustum
-from quiltcli.render.needs import disk_warnings
+from quiltcli.render.needs import disk_warnings, number_warnings, page_warnings
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words, their_lit_facets
 from quiltcli.viewer.edge_on import edge_on_notices
@@ -69,6 +69,8 @@ def job_warnings(
         known = format_frames(job.frames)
         words = f"frame {others[0]} is" if len(others) == 1 else f"frames {format_frames(others)} are"
         yield f"{words} not among the job's frames {known} (the viewer is where its path goes on to)"
+    yield from page_warnings(layout)
+    yield from number_warnings(job, frames)
     yield from disk_warnings(job, layout, frames)
     if not has_embree():
         yield "embreex is not installed: triangles are sorted to facets without it, which takes longer"
