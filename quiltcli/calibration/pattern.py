@@ -199,7 +199,7 @@ def _flag(image: Float32Array, centre: FloatArray, size: float) -> None:
     j, i = np.mgrid[-half : half + 1, -half : half + 1]
     thick = max(half // 8, 0)
     head = j <= -half + 2 * max(half // 3, 1)
-    pole = (np.abs(i) <= thick) | (head & (2 * np.abs(i) <= j + half))
+    pole = np.where(head, 2 * np.abs(i) <= j + half, np.abs(i) <= thick)
     pennant = (i > thick) & (i <= half) & (j >= 0) & (j <= max(half // 2, 1))
     _stamp(image, pole, centre, WHITE)
     _stamp(image, pennant, centre, RED)

@@ -31,11 +31,13 @@ def write_patterns(
     names: Sequence[str] = (),
     step: int = 32,
     overwrite: bool = False,
+    opaque: bool = False,
 ) -> list[Path]:
     """Write `out`/KIND_page_01.png and so on; return the files.
 
     The numbers of a pattern are the code values of a PNG (255 times them, rounded, without any
-    transfer curve) and the linear values of an EXR. Pixels of no facet are transparent black.
+    transfer curve) and the linear values of an EXR. Pixels of no facet are transparent black
+    unless `opaque`.
 
     Args:
         layout: where the facets are.
@@ -45,6 +47,7 @@ def write_patterns(
         names: names of the facets by id.
         step: pixels between the lines of a grid, and a checker's field.
         overwrite: replace files that exist.
+        opaque: whether pixels of no facet are black, for who shows a picture as it is.
 
     Raises:
         OutputError: an unknown pattern or format, a file that is in the way or cannot be written.
@@ -62,6 +65,8 @@ def write_patterns(
     owners = pixel_owners(layout)
     for (kind, page), path in places.items():
         channels = page_pattern(layout, page, kind, owners, names, step, _dtype(kind, image_format))
+        if opaque:
+            channels["A"] = np.full_like(channels["A"], 255 if image_format == "png" else 1)
         if image_format == "png":
             write_png(path, channels)
         else:

@@ -23,6 +23,7 @@ from quiltcli.cli.options import OVERWRITE, PATH, PATTERN
 )
 @click.option("--format", "image_format", default="png", show_default=True, help="png or exr.")
 @click.option("--step", type=int, default=32, show_default=True, help="Pixels between lines of a grid.")
+@click.option("--opaque", is_flag=True, help="Black where no facet is, not transparent.")
 @click.option("--display", type=PATH, help="Display file, instead of the one the layout names.")
 @OVERWRITE
 def pattern(
@@ -31,6 +32,7 @@ def pattern(
     kinds: tuple[str, ...],
     image_format: str,
     step: int,
+    opaque: bool,
     display: Path | None,
     overwrite: bool,
 ) -> None:
@@ -47,7 +49,14 @@ def pattern(
     names = facets.names if facets is not None else ()
     chosen = tuple(KINDS) if "all" in kinds else tuple(dict.fromkeys(kinds))
     paths = write_patterns(
-        loaded, output, chosen, image_format=image_format, names=names, step=step, overwrite=overwrite
+        loaded,
+        output,
+        chosen,
+        image_format=image_format,
+        names=names,
+        step=step,
+        overwrite=overwrite,
+        opaque=opaque,
     )
     for path in paths:
         click.echo(str(path))
