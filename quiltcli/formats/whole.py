@@ -62,8 +62,13 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write `text` as UTF-8 with bare newlines, whole or not at all (OutputError)."""
+    write_binary(path, text.encode())
+
+
+def write_binary(path: Path, data: bytes) -> None:
+    """Write bytes, whole or not at all (OutputError)."""
     with whole_file(path) as temporary:
-        temporary.write_bytes(text.encode())
+        temporary.write_bytes(data)
 
 
 def link_whole(source: Path, path: Path) -> None:
