@@ -6,15 +6,17 @@ does not hide a viewer that looks along up.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import ValidationError
 
 from quiltcli.analysis.delivery import delivery_problems
 from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
+from quiltcli.display.check import called
 from quiltcli.display.notices import display_notices
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
@@ -39,9 +41,11 @@ from quiltcli.render.notices import job_warnings
 from quiltcli.render.setup import facets_and_layout
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
-from quiltcli.viewer.view import facet_problems, view_problems
+from quiltcli.viewer.clip import their_lit_facets
+from quiltcli.viewer.view import facet_problems, view_problems, viewers_of
 
 T = TypeVar("T")
+_MOST_FRAMES = 1000  # looked at for facets that are always dark
 
 
 def check_files(
@@ -179,6 +183,20 @@ def _check_job(findings: _Findings, path: Path) -> None:
     scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is not None and not found:
         findings.notices += stereo_notices(job, facets, scene)
+        findings.notices += dark_notices(job, facets)
+
+
+def dark_notices(job: JobFile, facets: Facets) -> Iterator[str]:
+    """A sentence for facets that face away from whoever looks at them in every frame; none if all do."""
+    seen = np.zeros(facets.count, dtype=np.bool_)
+    for viewer in viewers_of(job, job.frames[:: -(-len(job.frames) // _MOST_FRAMES)]):
+        seen |= their_lit_facets(facets, viewer)
+    dark = np.flatnonzero(facets.enabled & ~seen).tolist()
+    if dark and seen.any():
+        named = ", ".join(called(k, facets.names).removeprefix("facet ") for k in dark[:5])
+        more = f" and {len(dark) - 5} more" if len(dark) > 5 else ""
+        words = "faces away from the viewer" if len(dark) == 1 else "face away from the viewer"
+        yield f"facet{'s' * (len(dark) > 1)} {named}{more} {words} in every frame: dark"
 
 
 def _job_alone(path: Path) -> JobFile | None:
