@@ -53,6 +53,15 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) path scenes/demo_cave.yaml -o $(DOCS)/take.png
 	$(QUILT) simulate scenes/demo_cave.yaml -f 120 -o $(DOCS)/cave-take.png --size 960x600 --supersample 2 --third-person
 	mv $(DOCS)/cave-take.left.png $(DOCS)/cave-take.png && rm $(DOCS)/cave-take.right.png
+	rm -rf out/lobby && $(QUILT) new corner -o out/lobby --left 8x4.5m --right 4.5x4.5m --pitch 6mm --canvas 2112x1024 --place right=1340,0,90 --frames 1-48
+	cp out/lobby/plan.png $(DOCS)/wall-plan.png
+	$(QUILT) simulate out/lobby/job.yaml -f 1 -o $(DOCS)/wall-eye.png --size 960x540 --supersample 3
+	$(QUILT) simulate out/lobby/job.yaml -f 1 -o $(DOCS)/wall-aside.png --size 960x540 --supersample 3 --from 6,2,9 --edges
+	$(QUILT) render out/lobby/job.yaml -f 1
+	$(QUILT) preview out/lobby/out/quilt/page_01.0001.exr -o $(DOCS)/wall-canvas.png
+	rm -rf out/lab && $(QUILT) new cave -o out/lab --size 3x3x3m --pixels 512x512
+	$(QUILT) simulate out/lab/job.yaml -f 1 -o $(DOCS)/cave-lab.png --third-person --from 2.6,3.4,5.2 --size 640x400 --supersample 3
+	$(PY) docs/pictures/reduce.py $(DOCS)/wall-*.png $(DOCS)/cave-lab.png
 	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
 
 test: env lint types ## lint, types and all tests but the long ones

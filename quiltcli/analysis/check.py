@@ -10,11 +10,13 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import ValidationError
 
 from quiltcli.analysis.delivery import delivery_problems
 from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
+from quiltcli.display.check import called
 from quiltcli.display.notices import display_notices
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
@@ -41,10 +43,11 @@ from quiltcli.render.unseen import unseen_notices
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
-from quiltcli.viewer.clip import settled_clip
-from quiltcli.viewer.view import View, facet_problems, view_problems, views_of
+from quiltcli.viewer.clip import settled_clip, their_lit_facets
+from quiltcli.viewer.view import View, facet_problems, view_problems, viewers_of, views_of
 
 T = TypeVar("T")
+_MOST_FRAMES = 1000  # looked at for facets that are always dark
 
 
 def check_files(
@@ -189,6 +192,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if facets is None or found:
         return
     findings.notices += stereo_notices(job, facets, scene)
+    findings.notices += dark_notices(job, facets)
     if len(findings.problems) == before:
         views = views_of(job, job.frames, settled_clip(job, facets))
         at = None if scene is None else source.scene_at if source is not None else lambda frame: scene
@@ -205,6 +209,19 @@ def _unseen(
     """Why views of a job show nothing, as far as it can be said of what is there."""
     how = job.render
     yield from unseen_notices(views, facets, layout, scene_at, bleed=how.bleed, culling=how.backface_culling)
+
+
+def dark_notices(job: JobFile, facets: Facets) -> Iterator[str]:
+    """A sentence for facets that face away from whoever looks at them in every frame; none if all do."""
+    seen = np.zeros(facets.count, dtype=np.bool_)
+    for viewer in viewers_of(job, job.frames[:: -(-len(job.frames) // _MOST_FRAMES)]):
+        seen |= their_lit_facets(facets, viewer)
+    dark = np.flatnonzero(facets.enabled & ~seen).tolist()
+    if dark and seen.any():
+        named = ", ".join(called(k, facets.names).removeprefix("facet ") for k in dark[:5])
+        more = f" and {len(dark) - 5} more" if len(dark) > 5 else ""
+        words = "faces away from the viewer" if len(dark) == 1 else "face away from the viewer"
+        yield f"facet{'s' * (len(dark) > 1)} {named}{more} {words} in every frame: dark"
 
 
 def _job_alone(path: Path) -> JobFile | None:

@@ -164,8 +164,8 @@ def blender_projected(track: dict[str, Any], key: dict[str, Any], points: np.nda
     local = there @ np.linalg.inv(np.array(key["matrix"])).T
     width, height = track["pixels"]
     tall = height / width * track["aspect"][1] / track["aspect"][0]
-    x = local[:, 0] / -local[:, 2] * key["lens"] / 36 - key["shift_x"]
-    y = local[:, 1] / -local[:, 2] * key["lens"] / 36 - key["shift_y"]
+    x = local[:, 0] / -local[:, 2] * key["lens"] / key["sensor_width"] - key["shift_x"]
+    y = local[:, 1] / -local[:, 2] * key["lens"] / key["sensor_width"] - key["shift_y"]
     return np.column_stack((2 * x, 2 * y / tall))
 
 
@@ -182,6 +182,98 @@ def test_the_script_for_blender_puts_corners_on_corners(tmp_path: Path) -> None:
         for key in track["keys"]:
             seen = blender_projected(track, key, stage.facets.polygon(facet))
             np.testing.assert_allclose(seen, picture_corners(stage.facets, facet), atol=1e-9)
+
+
+def test_a_window_too_wide_for_blender_s_shortest_lens_has_a_wider_sensor(tmp_path: Path) -> None:
+    """Blender keeps lenses at 1 mm or more: a facet seen from its edge has a window wider than 36."""
+    camera = replace(found(stage_of(tmp_path))[0].cameras[0], window=(-50.25, -5.0, 2.0, 3.0))
+    key = json.loads(
+        re.findall(r'r"""\n(.*)\n"""', blender.script([Shot(1, "center", (camera,))], Fraction(24)))[0]
+    )
+    found_key = key["tracks"][0]["keys"][0]
+    assert found_key["lens"] >= 1
+    assert found_key["lens"] / found_key["sensor_width"] == pytest.approx(1 / 45.25, rel=1e-12)
+
+
+def test_usd_has_the_window_in_doubles_and_in_binary(tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    from pxr import Gf, Usd, UsdGeom
+
+    stage = stage_of(tmp_path)
+    for name in ("a.usda", "a.usdc"):
+        write_cameras(stage, range(1, 5), tmp_path / name)
+    assert (tmp_path / "a.usdc").read_bytes()[:8] == b"PXR-USDC"
+    for name in ("a.usda", "a.usdc"):
+        read = Usd.Stage.Open(str(tmp_path / name))
+        for shot in found(stage):
+            for camera in shot.cameras:
+                prim = read.GetPrimAtPath(f"/cameras/{camera.name}")
+                view = UsdGeom.Camera(prim).GetCamera(shot.frame).frustum.ComputeViewMatrix()
+                left, right, bottom, top = prim.GetAttribute("quilt:window").Get(shot.frame)
+                corners = stage.facets.polygon(camera.facet - 1)
+                local = np.array([view.Transform(Gf.Vec3d(*corner.tolist())) for corner in corners])
+                x, y = local[:, 0] / -local[:, 2], local[:, 1] / -local[:, 2]
+                seen = np.column_stack(
+                    ((2 * x - left - right) / (right - left), (2 * y - bottom - top) / (top - bottom))
+                )
+                np.testing.assert_allclose(seen, picture_corners(stage.facets, camera.facet - 1), atol=1e-9)
+
+
+CANVAS = ("scene: scene.yaml", "scene: scene.yaml\nlayout: {size: [260, 160]}")
+
+
+def unreal_corners(screen: dict[str, Any]) -> np.ndarray:
+    """Lower left, lower right, upper right, upper left, by Unreal's rotator, as points of our world."""
+    p, y, r = (np.radians(screen["rotation"][name]) for name in ("pitch", "yaw", "roll"))
+    right = np.array([
+        np.sin(r) * np.sin(p) * np.cos(y) - np.cos(r) * np.sin(y),
+        np.sin(r) * np.sin(p) * np.sin(y) + np.cos(r) * np.cos(y),
+        -np.sin(r) * np.cos(p),
+    ])  # fmt: skip
+    up = np.array([
+        -(np.cos(r) * np.sin(p) * np.cos(y) + np.sin(r) * np.sin(y)),
+        np.cos(y) * np.sin(r) - np.cos(r) * np.sin(p) * np.sin(y),
+        np.cos(r) * np.cos(p),
+    ])  # fmt: skip
+    middle = np.array([screen["location"][axis] for axis in "xyz"])
+    wide, high = screen["size"]["width"] / 2, screen["size"]["height"] / 2
+    there = [middle + a * wide * right + b * high * up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return np.array([(y, z, -x) for x, y, z in there]) / 100
+
+
+def test_ndisplay_gets_screens_where_facets_are(tmp_path: Path) -> None:
+    stage_of(tmp_path, CANVAS)
+    floor = "- {name: floor, pixels: [60, 40], size: [3 m, 2 m], at: [0, 0, 1], pitch_deg: 90, yaw_deg: 30}\n"
+    places = iter((0, 80, 140, 200))
+    lines = [line.replace("}", f", place: {{at: [{next(places)}, 8]}}}}") if line.startswith("-") else line
+             for line in (PANELS + floor).splitlines()]  # fmt: skip
+    (tmp_path / "display.yaml").write_text("\n".join(lines))
+    stage = set_stage(load_job(tmp_path / "job.yaml"))
+    write_cameras(stage, [1], tmp_path / "a.ndisplay")
+    data = json.loads((tmp_path / "a.ndisplay").read_text())["nDisplay"]
+    screens_found = data["scene"]["screens"]
+    assert list(screens_found) == ["screen_left", "screen_right", "screen_away", "screen_floor"]
+    for facet, screen in enumerate(screens_found.values()):
+        np.testing.assert_allclose(unreal_corners(screen), stage.facets.polygon(facet), atol=1e-9)
+    # A wall that faces +Z is looked at along Unreal's X, from centimetres away.
+    eye = data["scene"]["cameras"]["DefaultViewPoint"]["location"]
+    x, y, z = stage.views([1])[0].viewer.eye * 100
+    assert (eye["x"], eye["y"], eye["z"]) == pytest.approx((-z, x, y))
+    viewports = data["cluster"]["nodes"]["node_1"]["viewports"]
+    for name, viewport in viewports.items():
+        assert viewport["projectionPolicy"]["parameters"]["screen"] == f"screen_{name}"
+        row = stage.facets.names.index(name)
+        region = [viewport["region"][key] for key in ("x", "y", "w", "h")]
+        assert region == [*stage.layout.quilt_from_facet[row][:, 2], *stage.layout.size[row]]
+
+
+def test_ndisplay_has_no_turned_viewports(tmp_path: Path) -> None:
+    stage_of(tmp_path, CANVAS)
+    turned = PANELS.replace("roll_deg: 30", "place: {at: [0, 0], rotate: 90}")
+    (tmp_path / "display.yaml").write_text(turned)
+    stage = set_stage(load_job(tmp_path / "job.yaml"))
+    with pytest.raises(DisplayError, match=r"facet 1 \(left\) is turned or mirrored in the quilt"):
+        write_cameras(stage, [1], tmp_path / "a.ndisplay")
 
 
 def numbers(text: str | None) -> list[float]:

@@ -219,7 +219,7 @@ def write_seeds(folder: Path) -> None:
     }  # fmt: skip
     for name, text in texts.items():
         (folder / name).write_text(text)
-    _write_binary_meshes(folder)
+    _write_whole_meshes(folder)
     for command in (
         "pack display.yaml --method rows --size 80x80 -o layout.yaml",
         *(f"export layout.yaml -o map.{suffix}" for suffix in ("csv", "json", "obj", "mpcdi")),
@@ -243,7 +243,7 @@ def write_seeds(folder: Path) -> None:
         assert result.exit_code == 0, (command, result.output)
 
 
-def _write_binary_meshes(folder: Path) -> None:
+def _write_whole_meshes(folder: Path) -> None:
     import trimesh
 
     box = trimesh.creation.box()

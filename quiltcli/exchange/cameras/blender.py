@@ -14,6 +14,7 @@ from quiltcli.exchange.cameras.cameras import Camera, Shot
 from quiltcli.exchange.cameras.tracks import Track, tracks
 
 _SENSOR = 36.0  # millimetres; only its ratio to the lens matters
+_LEAST_LENS = 1.0  # millimetres: Blender takes no shorter one
 
 _SCRIPT = '''"""Cameras for the facets of a display, made by quilt.
 
@@ -36,14 +37,14 @@ DATA = json.loads(r"""
 def make(track):
     name = "quilt." + track["name"]
     data = bpy.data.cameras.new(name)
-    data.sensor_fit, data.sensor_width = "HORIZONTAL", @SENSOR@
+    data.sensor_fit = "HORIZONTAL"
     camera = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(camera)
     for key in track["keys"]:
         camera.matrix_world = Matrix(key["matrix"])
         camera.keyframe_insert("location", frame=key["frame"])
         camera.keyframe_insert("rotation_euler", frame=key["frame"])
-        for attribute in ("lens", "shift_x", "shift_y", "clip_start", "clip_end"):
+        for attribute in ("sensor_width", "lens", "shift_x", "shift_y", "clip_start", "clip_end"):
             setattr(data, attribute, key[attribute])
             data.keyframe_insert(attribute, frame=key["frame"])
     return camera
@@ -85,7 +86,7 @@ def script(shots: Sequence[Shot], fps: Fraction) -> str:
         "tracks": [_track(track) for track in tracks(shots)],
     }
     text = json.dumps(data, ensure_ascii=True)
-    return _SCRIPT.replace("@DATA@", text).replace("@SENSOR@", repr(_SENSOR))
+    return _SCRIPT.replace("@DATA@", text)
 
 
 def _rate(fps: Fraction) -> list[float]:
@@ -110,8 +111,10 @@ def _key(camera: Camera) -> dict[str, Any]:
     left, right, bottom, top = camera.window
     columns = [camera.axes[0], camera.axes[1], -camera.axes[2], camera.position]
     x, y, z = ([float(column[axis]) for column in columns] for axis in range(3))
+    sensor = max(_SENSOR, _LEAST_LENS * (right - left))
     return {
-        "lens": _SENSOR / (right - left),
+        "sensor_width": sensor,
+        "lens": sensor / (right - left),
         "shift_x": (right + left) / 2 / (right - left),
         "shift_y": (top + bottom) / 2 / (right - left),
         "clip_start": camera.near,

@@ -6,9 +6,12 @@ Apertures, offsets and focal length are in tenths of a scene unit, and single pr
 from __future__ import annotations
 
 import re
+import tempfile
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from pathlib import Path
 
+from quiltcli.errors import missing_extra
 from quiltcli.exchange.cameras.cameras import Camera, Shot
 from quiltcli.exchange.cameras.tracks import Track, tracks
 
@@ -42,6 +45,20 @@ def usda_text(shots: Sequence[Shot], fps: Fraction) -> str:
     return "\n".join([*lines, "}"]) + "\n"
 
 
+def usdc_bytes(shots: Sequence[Shot], fps: Fraction) -> bytes:
+    """The same in USD's binary form (MissingExtraError without usd-core)."""
+    try:
+        from pxr import Sdf
+    except ImportError:
+        raise missing_extra("a .usdc file", "usd-core", "usd") from None
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.ImportFromString(usda_text(shots, fps))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cameras.usdc"
+        layer.Export(str(path))
+        return path.read_bytes()
+
+
 def _camera_lines(track: Track) -> list[str]:
     attributes: list[tuple[str, Callable[[Camera], str]]] = [
         ("matrix4d xformOp:transform", _matrix),
@@ -50,6 +67,8 @@ def _camera_lines(track: Track) -> list[str]:
         ("float verticalAperture", lambda c: repr(_FOCAL * (c.window[3] - c.window[2]))),
         ("float verticalApertureOffset", lambda c: repr(_FOCAL * (c.window[3] + c.window[2]) / 2)),
         ("float2 clippingRange", lambda c: f"({c.near!r}, {c.far!r})"),
+        # Apertures are single precision: whoever needs more has the window itself, left to top.
+        ("custom double4 quilt:window", lambda c: "(" + ", ".join(map(repr, c.window)) + ")"),
     ]
     lines = [f'    def Camera "{_prim(track.name)}"', "    {"]
     lines.append(f"        float focalLength = {_FOCAL!r}")

@@ -9,10 +9,11 @@ from pathlib import Path
 
 from quiltcli.display import Facets
 from quiltcli.errors import OutputError, Problem
-from quiltcli.exchange.cameras import blender, screens, usd
+from quiltcli.exchange.cameras import blender, ndisplay, screens, usd
 from quiltcli.exchange.cameras.cameras import Shot, shots
 from quiltcli.exchange.cameras.json import json_text
-from quiltcli.formats.whole import write_text
+from quiltcli.formats.whole import write_whole
+from quiltcli.layout import Layout
 from quiltcli.render.setup import Stage
 
 
@@ -21,15 +22,18 @@ class Shooting:
     """What every form is written from."""
 
     facets: Facets
+    layout: Layout
     shots: Sequence[Shot]
     fps: Fraction
 
 
-FORMS: dict[str, Callable[[Shooting], str]] = {
+FORMS: dict[str, Callable[[Shooting], str | bytes]] = {
     ".sgct.json": lambda given: screens.sgct_text(given.facets, given.shots),
     ".json": lambda given: json_text(given.shots),
     ".py": lambda given: blender.script(given.shots, given.fps),
     ".usda": lambda given: usd.usda_text(given.shots, given.fps),
+    ".usdc": lambda given: usd.usdc_bytes(given.shots, given.fps),
+    ".ndisplay": lambda given: ndisplay.ndisplay_text(given.facets, given.layout, given.shots),
     ".pvx": lambda given: screens.pvx_text(given.facets),
 }
 
@@ -41,6 +45,7 @@ def write_cameras(stage: Stage, frames: Sequence[int], path: Path) -> int:
         OutputError: a name that asks for no form there is, or a file that cannot be written.
         DisplayError: facets that no camera can make.
         ViewerError: no pose at one of the frames.
+        MissingExtraError: `.usdc` is asked for without usd-core.
     """
     form = next((form for suffix, form in FORMS.items() if path.name.lower().endswith(suffix)), None)
     if form is None:
@@ -53,5 +58,6 @@ def write_cameras(stage: Stage, frames: Sequence[int], path: Path) -> int:
     if path.exists():
         raise OutputError(Problem("exists already (remove it, or choose another name)", file=str(path)))
     found = shots(stage.facets, stage.views(frames))
-    write_text(path, form(Shooting(stage.facets, found, stage.job.fps)))
+    content = form(Shooting(stage.facets, stage.layout, found, stage.job.fps))
+    write_whole(path, content.encode() if isinstance(content, str) else content)
     return sum(len(shot.cameras) for shot in found)
