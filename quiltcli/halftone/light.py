@@ -79,8 +79,8 @@ def white_gain(filters: FloatArray) -> float:
 def dwell(along: FloatArray, across: FloatArray) -> FloatArray:
     """How long pixels dwell on a distant viewer, relative to the pixel where the axis meets the mirror.
 
-    A pixel's fan points to the azimuth θ + atan(across). While the mirror turns by dθ, its frame turns
-    under the pixel, `across` changes by −along·dθ, and so the fan sweeps by 1 − along/(1 + across²).
+    A pixel's fan points to the azimuth θ − atan(across). While the mirror turns by dθ, its frame turns
+    under the pixel, `across` grows by along·dθ, and so the fan sweeps by (1 − along/(1 + across²)) dθ.
 
     Args:
         along: (…) where a pixel's ray meets the plane at distance 1 below the projector, towards the viewers.
