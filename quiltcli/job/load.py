@@ -1,4 +1,4 @@
-"""Read the four kinds of file into their models, with every problem of a file in one error."""
+"""Read every kind of file into its model, with every problem of a file in one error."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from pydantic import ValidationError
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.inputs import check_input
 from quiltcli.formats.yaml.source import Source, YamlFile, parse_yaml
+from quiltcli.job.calibration import CalibrationFile
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import LayoutFile, PackSpec
+from quiltcli.job.lightfield import LightfieldFile
 from quiltcli.job.messages import KINDS, NO_KIND, problems_of, version_problem
 from quiltcli.job.model import MESHES, YAMLS, FileModel, attach
 from quiltcli.job.overrides import apply_sets
@@ -21,7 +23,9 @@ from quiltcli.job.scene import ObjectSpec, SceneFile
 
 M = TypeVar("M", bound=FileModel)
 T = TypeVar("T")
-MODELS: dict[str, type[FileModel]] = {m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile)}
+MODELS: dict[str, type[FileModel]] = {
+    m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile, LightfieldFile, CalibrationFile)
+}
 
 
 def load_display_file(path: Path | str) -> DisplayFile:
@@ -60,6 +64,24 @@ def load_scene_file(path: Path | str) -> SceneFile:
         attach(scene, Source(path))
         return scene
     return _load(SceneFile, parse_yaml(path))
+
+
+def load_lightfield_file(path: Path | str) -> LightfieldFile:
+    """Read a light field file.
+
+    Raises:
+        JobError: with every problem of the file.
+    """
+    return _load(LightfieldFile, parse_yaml(path))
+
+
+def load_calibration_file(path: Path | str) -> CalibrationFile:
+    """Read a calibration file.
+
+    Raises:
+        JobError: with every problem of the file.
+    """
+    return _load(CalibrationFile, parse_yaml(path))
 
 
 def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
@@ -106,7 +128,7 @@ def pack_spec(**wishes: Any) -> PackSpec:
 
 
 def file_kind(path: Path | str) -> str:
-    """Which kind of file this is: `quilt_display`, `quilt_layout`, `quilt_scene` or `quilt_job`.
+    """Which kind of file this is: `quilt_display`, `quilt_job` and so on.
 
     Raises:
         JobError: it is none of them.
