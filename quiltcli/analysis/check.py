@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
+from quiltcli.display.clicks import calibrate
 from quiltcli.display.notices import display_notices
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
@@ -22,15 +23,15 @@ from quiltcli.formats.yaml.source import parse_yaml
 from quiltcli.images.names import layout_path
 from quiltcli.job import (
     JobFile,
-    LayoutFile,
     PackSpec,
     SceneFile,
     check_file,
     file_kind,
+    load_calibration_file,
     load_display_file,
-    load_layout_file,
     load_scene_file,
 )
+from quiltcli.job.layout_table import LayoutTable, read_layout_table
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
@@ -132,18 +133,19 @@ def _check_scene(findings: _Findings, path: Path) -> None:
 
 def _check_layout(findings: _Findings, path: Path) -> None:
     layout = findings.run(read_layout, path)
-    facets = _display_of(findings, load_layout_file(path))
+    facets = _display_of(findings, read_layout_table(path))
     findings.run(align, layout, facets)
 
 
-def _display_of(findings: _Findings, layout: LayoutFile) -> Facets | None:
+def _display_of(findings: _Findings, layout: LayoutTable) -> Facets | None:
     """The display a layout says it was made for, if it says so."""
-    if layout.display is None:
+    display = layout.head.display
+    if display is None:
         return None
-    if is_regular(layout.display):
-        return findings.facets(layout.display)
-    what = "is a directory (expected a display file)" if layout.display.is_dir() else "no such file"
-    findings.problems.append(layout.source.problem("display", f"{what}: {layout.display}"))
+    if is_regular(display):
+        return findings.facets(display)
+    what = "is a directory (expected a display file)" if display.is_dir() else "no such file"
+    findings.problems.append(layout.source.problem(["display"], f"{what}: {display}"))
     return None
 
 
@@ -170,6 +172,10 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.notices += stereo_notices(job, facets, scene)
 
 
+def _check_calibration(findings: _Findings, path: Path) -> None:
+    findings.run(calibrate, findings.run(load_calibration_file, path))
+
+
 def _job_alone(path: Path) -> JobFile | None:
     """A job whose own file is right, whatever may be wrong with the files it names."""
     found = parse_yaml(path)
@@ -186,4 +192,5 @@ CHECKS: dict[str, Callable[[_Findings, Path], None]] = {
     "quilt_layout": _check_layout,
     "quilt_scene": _check_scene,
     "quilt_job": _check_job,
+    "quilt_calibration": _check_calibration,
 }

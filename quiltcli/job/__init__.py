@@ -5,6 +5,7 @@ Load a file and every problem in it comes in one `JobError`; every model and par
 """
 
 from quiltcli.job.calibration import CalibrationFile
+from quiltcli.job.check import check_file
 from quiltcli.job.digest import file_sha256, job_sha256
 from quiltcli.job.display import DisplayFile, FacetSpec, PanelSpec, ResolutionSpec, TransformSpec
 from quiltcli.job.dump import dump_job, dump_yaml
@@ -22,7 +23,6 @@ from quiltcli.job.layout import (
 from quiltcli.job.lengths import UNITS
 from quiltcli.job.lightfield import LightfieldFile
 from quiltcli.job.load import (
-    check_file,
     file_kind,
     load_calibration_file,
     load_display_file,
