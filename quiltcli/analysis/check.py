@@ -29,12 +29,14 @@ from quiltcli.job import (
     file_kind,
     load_calibration_file,
     load_display_file,
+    load_lightfield_file,
     load_scene_file,
 )
 from quiltcli.job.layout_table import LayoutTable, read_layout_table
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
+from quiltcli.lightfield import load_field
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
 from quiltcli.scene import Scene, load_scene
@@ -176,6 +178,13 @@ def _check_calibration(findings: _Findings, path: Path) -> None:
     findings.run(calibrate, findings.run(load_calibration_file, path))
 
 
+def _check_lightfield(findings: _Findings, path: Path) -> None:
+    file = findings.run(load_lightfield_file, path)
+    # Of what moves, the job says the frames.
+    frames = () if file is not None and file.is_animated else (1,)
+    findings.run(load_field, file, frames)
+
+
 def _job_alone(path: Path) -> JobFile | None:
     """A job whose own file is right, whatever may be wrong with the files it names."""
     found = parse_yaml(path)
@@ -192,5 +201,6 @@ CHECKS: dict[str, Callable[[_Findings, Path], None]] = {
     "quilt_layout": _check_layout,
     "quilt_scene": _check_scene,
     "quilt_job": _check_job,
+    "quilt_lightfield": _check_lightfield,
     "quilt_calibration": _check_calibration,
 }
