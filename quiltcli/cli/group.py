@@ -14,6 +14,7 @@ from quiltcli.errors import QuiltError
 COMMANDS = (
     "calibrate",
     "cameras",
+    "capture",
     "check",
     "compare",
     "contact",
