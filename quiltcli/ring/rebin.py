@@ -33,5 +33,6 @@ def rebinned(field: Field, pose: Pose, curve: Curve, lit: BoolArray, frame: int 
     """
     row, column = np.nonzero(lit)
     light = np.zeros((*lit.shape, 3), dtype=np.float32)
-    light[row, column] = rebin(field, rays_of(pose, curve, column + 0.5, row + 0.5), frame)
+    x, y = (np.asarray(index + 0.5, dtype=np.float64) for index in (column, row))
+    light[row, column] = rebin(field, rays_of(pose, curve, x, y), frame)
     return light
