@@ -31,6 +31,7 @@ COMMANDS = (
     "stereo",
     "sweetspot",
     "unmap",
+    "unpack",
     "verify",
     "view",
 )
