@@ -108,7 +108,7 @@ class RenderSpec(Model):
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
     method: Annotated[str, OneOf((*METHODS, "exact", "vertex"))] = "homography"
-    """Render method; on a 360° light field display exact (meant where the key is absent), raycast or vertex."""
+    """Render method; on a 360° light field display exact (so where the key is absent), raycast or vertex."""
     tessellate: Positive | None = None
     """With method: vertex, how far edges may bend before triangles are divided; 0.05 when absent, pixels."""
     depth_bits: Annotated[
@@ -127,7 +127,11 @@ class RenderSpec(Model):
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        return "zv" in channels or self.depth_bits is not None or self.method not in ("homography", *RING_METHODS)
+        return (
+            "zv" in channels
+            or self.depth_bits is not None
+            or self.method not in ("homography", *RING_METHODS)
+        )
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Rays have neither a depth buffer nor several samples; depth buffers lie between planes."""

@@ -25,7 +25,10 @@ from quiltcli.job.scene import ObjectSpec, SceneFile
 M = TypeVar("M", bound=FileModel)
 T = TypeVar("T")
 _FIRST_KEY = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\n)*(\w+):")
-MODELS: dict[str, type[FileModel]] = {m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile)}
+MODELS: dict[str, type[FileModel]] = {
+    **{m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile)},
+    "quilt_lightfield360": MirrorDisplayFile,
+}
 
 
 def load_display_file(path: Path | str) -> DisplayFile:

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field
 
 from quiltcli.geometry import FloatArray
 from quiltcli.job.model import (
+    YAMLS,
     Complaint,
     ExistingFile,
     FileModel,
@@ -22,10 +23,10 @@ from quiltcli.job.model import (
     OneOf,
     Positive,
     Size,
-    YAMLS,
     complaint,
     exactly_one,
 )
+from quiltcli.job.timing import Timing
 
 KIND = "lightfield360"
 """What `kind` says in such a display file."""
@@ -52,7 +53,10 @@ class ProjectorSpec(Model):
         """One way to say it; a matrix that is a camera's, above the mirror."""
         yield from exactly_one(self, "height", "matrix", "calibration")
         if self.height is not None and self.diameter is None:
-            yield ("diameter",), "missing key (what the picture's width covers at the mirror's middle, metres)"
+            yield (
+                ("diameter",),
+                "missing key (what the picture's width covers at the mirror's middle, metres)",
+            )
         if self.height is None and self.diameter is not None:
             yield ("diameter",), "belongs to height (expected no such key beside matrix or calibration)"
         if self.matrix is not None:
@@ -76,7 +80,9 @@ class OutlineSpec(Model):
 
     disk: Positive | None = None
     """Diameter as seen from above, metres."""
-    rectangle: Annotated[tuple[Positive, Positive], Items(2, "lengths, across and up the slope")] | None = None
+    rectangle: Annotated[tuple[Positive, Positive], Items(2, "lengths, across and up the slope")] | None = (
+        None
+    )
     """Size across and up the slope, each plane of a tent its own, metres."""
 
     def cross_checks(self) -> Iterator[Complaint]:
@@ -123,7 +129,7 @@ class PackingSpec(Model):
     bits: Annotated[str, OneOf(("lsb", "msb"))] = "lsb"
     """Which bit of a channel is shown first: the least or the most significant."""
     refresh: Positive = 200.0
-    """Sent pictures a second."""
+    """Pictures that are sent in a second, Hz."""
     rpm: Positive | None = None
     """Turns of the mirror a minute; checked against the other numbers where it is given."""
 
@@ -154,7 +160,7 @@ class MirrorDisplayFile(FileModel):
 
     quilt_display: Annotated[int, Field(ge=1, le=1)] = 1
     """Version of the format."""
-    display: Annotated[str, OneOf((KIND,)), Field(alias="kind")] = KIND
+    display: Annotated[str, OneOf((KIND,)), Field(alias="kind")]
     """Kind of the display."""
     image: Size = (768, 768)
     """Width and height of a picture, pixels."""
@@ -177,10 +183,21 @@ class MirrorDisplayFile(FileModel):
             apart = (self.sides[1].azimuth_deg - self.sides[0].azimuth_deg) % 360
             if abs(apart - 180) > 1e-9:
                 yield ("sides", 1, "azimuth_deg"), f"must be 180 from the first side's, got {apart:g}"
+        if wrong := self.timing.fault(self.packing.rpm):
+            yield ("packing", "rpm"), wrong
         height = self.projector.height
         reach = self.reach
         if height is not None and reach >= height:
-            yield ("mirror", "outline"), f"reaches {reach:g} m, as far as the projector is high ({height:g} m)"
+            yield (
+                ("mirror", "outline"),
+                f"reaches {reach:g} m, as far as the projector is high ({height:g} m)",
+            )
+
+    @property
+    def timing(self) -> Timing:
+        """How fast projector, pictures and mirror go."""
+        lobe = self.diffuser.horizontal_deg
+        return Timing(self.packing.refresh, self.rotation.positions, lobe, self.packing.images)
 
     @property
     def reach(self) -> float:
@@ -190,7 +207,9 @@ class MirrorDisplayFile(FileModel):
             return outline.disk / 2
         assert outline.rectangle is not None
         across, up = outline.rectangle
-        return math.hypot(across / 2, up * math.cos(math.radians(self.mirror.tilt_deg)) / (2 - bool(self.sides)))
+        return math.hypot(
+            across / 2, up * math.cos(math.radians(self.mirror.tilt_deg)) / (2 - bool(self.sides))
+        )
 
 
 def is_mirror(data: Any) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
@@ -58,8 +58,16 @@ class RingSpec(Model):
     """Farthest that is drawn; twice the distance when absent, metres."""
     users: Annotated[tuple[UserSpec, ...], Listed] = ()
     """Those who stand elsewhere."""
-    heads: Annotated[HeadsSpec, ShortFor(lambda v: v if isinstance(v, (dict, Model)) else {"csv": v},
-                     {"type": "string", "format": "path", "minLength": 1})] | None = None
+    heads: (
+        Annotated[
+            HeadsSpec,
+            ShortFor(
+                lambda v: v if isinstance(v, (dict, Model)) else {"csv": v},
+                {"type": "string", "format": "path", "minLength": 1},
+            ),
+        ]
+        | None
+    ) = None
     """Those who walk about: a CSV file, or a mapping with `csv`."""
 
     @property

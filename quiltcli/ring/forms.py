@@ -100,7 +100,7 @@ def distances(
     kappa: FloatArray,
     eta: FloatArray | None,
 ) -> FloatArray:
-    """s at which rays meet planes (4, ...)."""
+    """S at which rays meet planes (4, ...)."""
     below: FloatArray = plane[1] * b
     below += plane[0]
     below += plane[2] * m

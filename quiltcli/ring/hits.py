@@ -6,43 +6,31 @@ lights stand where they do; rays are each pixel's own, so that whatever depends 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from quiltcli.geometry import FloatArray, IntArray, slices
+from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.ring.forms import edge_values, forms_of
 from quiltcli.ring.raster import Mesh, Visible, depth
 from quiltcli.ring.rig import Pose
 from quiltcli.scene import Scene
-from quiltcli.shading.adaptive import Shaded
 from quiltcli.visibility.resolve.hits import Hits, single_places
 from quiltcli.visibility.resolve.vectors import PointVectors
 
 EYE = np.zeros(3)
-_CHUNK = 16384
 
 
-def shaded_points(
-    pose: Pose, mesh: Mesh, scene: Scene, seen: Visible
-) -> Iterator[Shaded]:
-    """Everything that is seen in a picture, for the channels to be made of, chunk by chunk.
+def ring_hits(pose: Pose, mesh: Mesh, scene: Scene, seen: Visible, part: slice, address: IntArray) -> Hits:
+    """Hits of some of the pixels that see something.
 
     Args:
         pose: the mirror.
         mesh: the scene's triangles.
         scene: the scene.
         seen: what the pixels see.
+        part: which of them.
+        address: (P,) where these lie in the picture.
     """
-    for part in slices(0, seen.pixel.size, _CHUNK):
-        pixel, triangle = seen.pixel[part], seen.triangle[part]
-        yield Shaded(scene, EYE, ring_hits(pose, mesh, scene, seen, pixel, triangle))
-
-
-def ring_hits(
-    pose: Pose, mesh: Mesh, scene: Scene, seen: Visible, pixel: IntArray, triangle: IntArray
-) -> Hits:
-    """Hits of pixels (P,) of a window that see triangles (P,)."""
+    pixel, triangle = seen.pixel[part], seen.triangle[part]
     weights, s = met(mesh, seen, pixel, triangle)
     frame = seen.rays.points(pixel, s)
     world = pose.axes.T @ (frame + pose.origin[:, None])
@@ -54,7 +42,7 @@ def ring_hits(
     towards = np.sign(-(rows[9:12] * ray).sum(axis=0))
     normal = (rows[0:3] + weights[0] * rows[3:6] + weights[1] * rows[6:9]) * towards
     return Hits(
-        places=single_places(pixel),
+        places=single_places(address),
         chosen=None,
         facet=np.zeros(pixel.size, dtype=np.int32),
         triangle=triangle.astype(np.int32),

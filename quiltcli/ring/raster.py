@@ -8,16 +8,16 @@ lower numbers winning among equals. It only ever grows, so nothing depends on th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
 from quiltcli.geometry import offsets as starts_of
+from quiltcli.ring.cone import viewer_through
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.forms import distances, edge_values, forms_of, sides
 from quiltcli.ring.plane import pixels_of, through_mirror, viewer_along
-from quiltcli.ring.cone import viewer_through
 from quiltcli.ring.propose import Boxes, bending, propose
 from quiltcli.ring.rays import RayTable, Window, window_rays
 from quiltcli.ring.rig import Pose
@@ -45,12 +45,12 @@ class Mesh:
     @property
     def count(self) -> int:
         """Triangles."""
-        return self.triangles.shape[1]
+        return int(self.triangles.shape[1])
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Distances from the viewer at which something is seen, metres; None where nothing is nearer or farther."""
+    """Distances from the viewer between which something is seen, metres."""
 
     near: float
     far: float
@@ -79,6 +79,10 @@ class Visible:
     candidates: int
     fragments: int
     bend: float
+
+    def some(self, rows: IntArray) -> Visible:
+        """Only some of the pixels that see something."""
+        return replace(self, pixel=self.pixel[rows], triangle=self.triangle[rows])
 
 
 def mesh_of(vertices: FloatArray, triangles: Int32Array) -> Mesh:
@@ -140,9 +144,7 @@ def see(
     seen = np.flatnonzero(keys)
     number = mesh.count - 1 - (keys[seen] & ((1 << bits) - 1))
     longest = float(np.sqrt(mesh.square.max(initial=0.0)))
-    return Visible(
-        window, rays, seen, number, corners, candidates, fragments, bend.most / 2 * longest**2 / 8
-    )
+    return Visible(window, rays, seen, number, corners, candidates, fragments, bend.most / 2 * longest**2 / 8)
 
 
 def in_frame(pose: Pose, vertices: FloatArray) -> FloatArray:
@@ -242,7 +244,7 @@ def _hits(
     return found, s, triangle.take(which)
 
 
-def _within(rays: RayTable, pixel: IntArray, s: FloatArray, limits: Limits) -> FloatArray:
+def _within(rays: RayTable, pixel: IntArray, s: FloatArray, limits: Limits) -> IntArray:
     """Which points (F,) lie between near and far."""
     distance = depth(rays, pixel, s)
     return np.flatnonzero((distance >= limits.near) & (distance <= limits.far))

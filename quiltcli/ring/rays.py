@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, slices
+from quiltcli.geometry import FloatArray, IntArray, slices
 from quiltcli.ring.cone import viewer_of
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.plane import on_mirror, viewer_along
@@ -64,7 +64,7 @@ class RayTable:
     eta: FloatArray | None
     end: FloatArray
 
-    def points(self, ray: slice | FloatArray, s: FloatArray) -> FloatArray:
+    def points(self, ray: slice | IntArray, s: FloatArray) -> FloatArray:
         """Points (3, N) on some rays, in the frame from P′."""
         along = self.b[ray] * s
         if self.eta is not None:
@@ -95,7 +95,8 @@ def rays_at(pose: Pose, curve: Curve, x: FloatArray, y: FloatArray) -> RayTable:
 def window_rays(pose: Pose, curve: Curve, window: Window, beside: tuple[float, float]) -> RayTable:
     """The rays of a window's pixels, row by row, `beside` their centres; chunk by chunk, to stay in cache."""
     size = window.size
-    found = RayTable(*(np.empty(size) for _ in range(4)), np.empty(size) if pose.cone else None, np.empty(size))
+    b, m, kappa, omega, end = np.empty((5, size))
+    found = RayTable(b, m, kappa, omega, np.empty(size) if pose.cone else None, end)
     column = np.arange(window.width) + (window.x + 0.5 + beside[0])
     rows = max(1, _ROWS // max(window.width, 1))
     for part in slices(0, window.height, rows):

@@ -18,6 +18,16 @@ facets:                           # what is different on single facets, by id
   3: {name: top, up: [0, 0, -1], rotate: 90}
 transform: {translate: [0, 1.2, 0], rotate_deg: [0, 15, 0]}
 """,
+    "lightfield360": """\
+quilt_display: 1
+kind: lightfield360
+image: [768, 768]
+projector: {height: 0.6, diameter: 0.13}        # or matrix, or calibration: clicks.yaml
+mirror: {tilt_deg: 45, outline: {disk: 0.13}}
+rotation: {positions: 288, direction: increasing, first_deg: 0}
+diffuser: {horizontal_deg: 1.25, reflection: plane}
+packing: {order: rgb, bits: lsb, refresh: 200}
+""",
     "job": """\
 quilt_job: 1
 display: display.yaml
@@ -66,6 +76,7 @@ background: [0, 0, 0]
 INTRODUCTIONS = {
     "display": "Which mesh is the display, how large it is, and how many pixels its facets have. `quilt pack`"
     " and every job read it.",
+    "lightfield360": "A display file whose `kind` is `lightfield360`: a projector above a spinning mirror.",
     "job": "What to render, for whom, and where to. Every key may be set on the command line as well:"
     " `--set render.samples=4`.",
     "layout": "Where each facet's pixels lie in the quilt. `quilt pack` and `quilt import` write it, and so"
