@@ -15,7 +15,7 @@ from quiltcli.job.dump import plain
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import PackSpec
 from quiltcli.job.layout_table import places_sha256, read_layout_table
-from quiltcli.job.load import load_display_file, load_scene_file
+from quiltcli.job.load import load_any_display, load_scene_file
 from quiltcli.job.model import YAMLS
 
 _PACKING = {"net": 2}
@@ -33,7 +33,7 @@ def job_sha256(job: JobFile) -> str:
     read, whatever they are by now.
     """
     data = plain(job, file_sha256)
-    data["display"] = plain(load_display_file(job.display), file_sha256)
+    data["display"] = plain(load_any_display(job.display), file_sha256)
     data["scene"] = _scene(job.scene)
     if isinstance(job.layout, Path):
         data["layout"] = _layout_sha256(job.layout)

@@ -38,7 +38,7 @@ def schema_of(kind: str) -> dict[str, Any]:
     schema: dict[str, Any] = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     schema.update(model.model_json_schema(by_alias=True))
     # Python code may leave the version out; a file must not.
-    schema["required"] = [kind, *schema.get("required", [])]
+    schema["required"] = [model.kind, *schema.get("required", [])]
     schema["title"] = f"{kind} file"
     return schema
 

@@ -21,7 +21,7 @@ BARE = {
     *("views", "first_view", "first_row", "count"),
     *("id", "page", "max_pages", "page_facets", "samples"),
     *("aspect", "metallic", "roughness", "specular", "scale", "matrix", "facets"),
-    *("look", "up", "direction", "color", "emission", "orientation"),
+    *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),
 }
 
 

@@ -42,6 +42,16 @@ camera: {focal: [1400, 1400], size: [1280, 720], look_at: [0, 0, 0]}
 encoding: srgb
 focus: mirror
 """,
+    "lightfield360": """\
+quilt_display: 1
+kind: lightfield360
+image: [768, 768]
+projector: {height: 0.6, diameter: 0.13}        # or matrix, or calibration: clicks.yaml
+mirror: {tilt_deg: 45, outline: {disk: 0.13}}
+rotation: {positions: 288, direction: increasing, first_deg: 0}
+diffuser: {horizontal_deg: 1.25, reflection: plane}
+packing: {order: rgb, bits: lsb, refresh: 200}
+""",
     "job": """\
 quilt_job: 1
 display: display.yaml
@@ -94,6 +104,7 @@ INTRODUCTIONS = {
     " mirror can show. `quilt capture` makes them of a scene.",
     "display": "Which mesh is the display, how large it is, and how many pixels its facets have. `quilt pack`"
     " and every job read it.",
+    "lightfield360": "A display file whose `kind` is `lightfield360`: a projector above a spinning mirror.",
     "job": "What to render, for whom, and where to. Every key may be set on the command line as well:"
     " `--set render.samples=4`.",
     "layout": "Where each facet's pixels lie in the quilt. `quilt pack` and `quilt import` write it, and so"
