@@ -169,6 +169,9 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.run(read_layout, choice)
     if facets is not None:
         findings.problems += facet_problems(job, facets.count)
+    if job.lightfield is not None:
+        findings.run(load_field, findings.run(load_lightfield_file, job.lightfield), job.frames)
+        return
     scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is not None and not found:
         findings.notices += stereo_notices(job, facets, scene)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
 import string
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
+from quiltcli.formats.inputs import name_fault
 from quiltcli.job.lengths import UpAxis
 from quiltcli.job.model import (
     Complaint,
@@ -49,6 +52,28 @@ def _pattern(text: str) -> str:
 
 
 Pattern = Annotated[str, AfterValidator(_pattern)]
+
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
+"""Suffixes of pictures, which a file of poses may leave out."""
+
+
+def posed_picture(folder: Path, name: object) -> Path | None:
+    """The picture that a file of poses in a folder names, if there is one."""
+    if not isinstance(name, str) or not name or name_fault(folder / name):
+        return None
+    file = folder / name
+    candidates = (file, *(file.with_name(file.name + suffix) for suffix in SUFFIXES))
+    return next((candidate for candidate in candidates if candidate.is_file()), None)
+
+
+def _posed(path: Path) -> Iterator[Path]:
+    """Pictures that a file of poses names; what else is wrong with it is told when it is read."""
+    with contextlib.suppress(ValueError, OSError, TypeError, KeyError):
+        for entry in json.loads(path.read_bytes())["frames"]:
+            picture = posed_picture(path.parent, entry["file_path"])
+            if picture is not None:
+                yield picture
 
 
 class HeightsSpec(Model):
@@ -180,6 +205,21 @@ class LightfieldFile(FileModel):
     def is_animated(self) -> bool:
         """Whether there are pictures for every frame."""
         return self.images is not None and "{frame" in self.images
+
+    def named(self, pattern: str, row: int, view: int, frame: int) -> Path:
+        """File of a row and view, both from 0, in a frame."""
+        number = {"row": row + self.first_row, "view": view + self.first_view, "frame": frame}
+        return (self.source.path or Path()).parent / pattern.format(**number)
+
+    def pictures(self, frames: Iterable[int]) -> Iterator[Path]:
+        """All pictures and depth maps of some frames, as far as this file or that of poses names them."""
+        if self.camera.transforms is not None:
+            yield from _posed(self.camera.transforms)
+        patterns = [pattern for pattern in (self.images, self.depths) if pattern is not None]
+        for frame in frames if self.is_animated else (1,):
+            for row in range(len(self.rows)):
+                for view in range(self.views or 0):
+                    yield from (self.named(pattern, row, view, frame) for pattern in patterns)
 
     def azimuths(self) -> tuple[float, ...]:
         """Azimuth of every view, radians."""

@@ -136,7 +136,8 @@ def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
         output.setdefault("directory", "out")
     job = _load(JobFile, found)
     problems, display = tried(load_any_display, job.display)
-    problems += tried(load_scene_file, job.scene)[0] if job.scene.suffix.lower() in YAMLS else []
+    if job.scene.suffix.lower() in YAMLS:
+        problems += tried(load_scene_file if job.lightfield is None else load_lightfield_file, job.scene)[0]
     if problems or display is None:
         raise JobError(problems)
     _fits(job, display)

@@ -41,16 +41,12 @@ class Field:
         if self.files:
             return self.files[view]
         assert self.file.images is not None
-        return self._named(self.file.images, row, view, frame)
+        return self.file.named(self.file.images, row, view, frame)
 
     def depth(self, row: int, view: int, frame: int) -> Path:
         """File of the depth map of a view."""
         assert self.file.depths is not None
-        return self._named(self.file.depths, row, view, frame)
-
-    def _named(self, pattern: str, row: int, view: int, frame: int) -> Path:
-        number = {"row": row + self.file.first_row, "view": view + self.file.first_view, "frame": frame}
-        return (self.file.source.path or Path()).parent / pattern.format(**number)
+        return self.file.named(self.file.depths, row, view, frame)
 
     def missing(self, frames: Iterable[int]) -> Iterator[Path]:
         """Pictures and depth maps of frames that there are not."""

@@ -19,11 +19,11 @@ import numpy as np
 from quiltcli.errors import JobError, Problem, first_of
 from quiltcli.formats.inputs import read_input
 from quiltcli.geometry import FloatArray
+from quiltcli.job.lightfield import posed_picture
 from quiltcli.lightfield.cameras import Cameras, Lens, Row
 
 OFF = 0.01
 """Share of a ring's radius by which a pose may lie beside the ring."""
-_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
 _MOST = 10
 
 
@@ -126,13 +126,12 @@ def _pose(frame: Any) -> FloatArray:
 def _picture(path: Path, frame: Any) -> Path:
     """The picture of an entry, whose suffix may be left out (ValueError)."""
     name = frame.get("file_path")
-    if not isinstance(name, str) or not name or "\0" in name:
+    if not isinstance(name, str) or not name:
         raise ValueError("has no file_path (expected the name of a picture)")
-    file = path.parent / name
-    for candidate in (file, *(file.with_name(file.name + suffix) for suffix in _SUFFIXES)):
-        if candidate.is_file():
-            return candidate
-    raise ValueError(f"names {name}, and there is no such picture")
+    picture = posed_picture(path.parent, name)
+    if picture is None:
+        raise ValueError(f"names {name}, and there is no such picture")
+    return picture
 
 
 def _lens(path: Path, data: dict[str, Any], picture: Path) -> Lens:
