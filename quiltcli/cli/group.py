@@ -12,6 +12,7 @@ from quiltcli.ending import end_by_error, ended
 from quiltcli.errors import QuiltError
 
 COMMANDS = (
+    "assemble",
     "calibrate",
     "cameras",
     "capture",
@@ -27,6 +28,7 @@ COMMANDS = (
     "path",
     "pattern",
     "preview",
+    "project",
     "render",
     "schema",
     "simulate",
