@@ -58,6 +58,15 @@ def _facets(text: str) -> tuple[int, ...]:
     return parse_facets(text)
 
 
+def _positions(text: str) -> tuple[int, ...]:
+    from quiltcli.job.frames import parse_frames
+
+    try:
+        return parse_frames(text)
+    except JobError as error:
+        raise JobError(error.problems[0].message.replace("frame", "position")) from None
+
+
 def _size(text: str) -> tuple[int, int] | None:
     if text == "auto":
         return None
@@ -133,6 +142,7 @@ def _job_keys() -> Iterable[str]:
 
 FRAMES = Parsed("frames", _frames)
 FACETS = Parsed("facets", _facets)
+POSITIONS = Parsed("positions", _positions)
 SIZE = Parsed("size", _size)
 ASPECT = Parsed("aspect", _aspect)
 POINT = Parsed("point", _point)

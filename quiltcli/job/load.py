@@ -15,7 +15,7 @@ from quiltcli.formats.yaml.source import Source, YamlFile, parse_text, parse_yam
 from quiltcli.formats.yaml.syntax import read_text
 from quiltcli.job.calibration import CalibrationFile
 from quiltcli.job.display import DisplayFile
-from quiltcli.job.job import JobFile
+from quiltcli.job.job import RING_METHODS, JobFile
 from quiltcli.job.layout import LayoutFile, PackSpec
 from quiltcli.job.lightfield import LightfieldFile
 from quiltcli.job.messages import KINDS, NO_KIND, problems_of, version_problem
@@ -141,6 +141,11 @@ def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
     if problems or display is None:
         raise JobError(problems)
     _fits(job, display)
+    if job.ring is not None and job.render.method not in RING_METHODS:
+        # The default is another display's: what is written down shall be what was done.
+        render = job.render.model_copy(update={"method": RING_METHODS[0]})
+        job = job.model_copy(update={"render": render})
+        attach(job, found.source)
     if job.layout is None and isinstance(display, DisplayFile):
         job = job.model_copy(update={"layout": display.layout or PackSpec()})
         attach(job, found.source)

@@ -119,7 +119,6 @@ def _users(ring: RingSpec, frame: int) -> Iterator[User]:
         yield User(math.atan2(z, x), y, distance, math.radians(spec.hold_deg), math.radians(spec.blend_deg))
 
 
-@lru_cache(maxsize=4)
 def read_heads(path: Path) -> Mapping[int, tuple[tuple[float, float, float], ...]]:
     """Places of the users by frame, in the order of their names.
 
@@ -127,6 +126,12 @@ def read_heads(path: Path) -> Mapping[int, tuple[tuple[float, float, float], ...
         ViewerError: a column is missing, a row makes no sense, or a user comes twice in a frame.
     """
     check_input(path, ViewerError, "a CSV file")
+    return _heads(path, path.stat().st_mtime_ns, path.stat().st_size)
+
+
+@lru_cache(maxsize=4)
+def _heads(path: Path, changed: int, size: int) -> Mapping[int, tuple[tuple[float, float, float], ...]]:
+    """The file as it was when it was last changed, read once."""
     text = path.read_text(encoding="utf-8-sig")
     lines = [line for line in csv.reader(text.splitlines()) if line]
     names = [name.strip().lower() for name in lines[0]] if lines else []

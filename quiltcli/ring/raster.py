@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, segments
 from quiltcli.geometry import offsets as starts_of
 from quiltcli.ring.cone import viewer_through
 from quiltcli.ring.curve import Curve
-from quiltcli.ring.forms import distances, edge_values, forms_of, sides
+from quiltcli.ring.forms import Forms, distances, edge_values, forms_of, sides
 from quiltcli.ring.plane import pixels_of, through_mirror, viewer_along
 from quiltcli.ring.propose import Boxes, bending, propose
 from quiltcli.ring.rays import RayTable, Window, window_rays
@@ -107,6 +107,8 @@ def see(
     backface_culling: bool = False,
     limits: Limits | None = None,
     beside: tuple[float, float] = (0.0, 0.0),
+    *,
+    straight: bool = False,
 ) -> Visible:
     """What the pixels of a picture see.
 
@@ -118,6 +120,7 @@ def see(
         backface_culling: leave out triangles that are seen from behind.
         limits: near and far, where anything may lie beyond them.
         beside: of the samples, pixels from the pixels' centres.
+        straight: let edges be straight between the corners' pixels, which they are not.
     """
     corners = in_frame(pose, mesh.vertices)
     least, most = corners.min(axis=1), corners.max(axis=1)
@@ -131,7 +134,13 @@ def see(
     keys = np.zeros(window.size, dtype=np.int64)
     candidates = fragments = 0
     for triangle, pixel in _tries(boxes, window):
-        found, s, which = _hits(mesh, corners, rays, triangle, pixel, backface_culling)
+        forms = forms_of(*(corners.take(corner.take(triangle), axis=1) for corner in mesh.triangles))
+        if straight:
+            hit = _straight(mesh, x, y, triangle, *_samples(window, pixel, sample), bend.front)
+        else:
+            hit = _sides(forms, rays, pixel)
+        found, s, which = _met(forms, rays, pixel, hit[0] if backface_culling else hit[0] | hit[1])
+        which = triangle.take(which)
         candidates += pixel.size
         if limits is not None:
             kept = _within(rays, found, s, limits)
@@ -208,28 +217,47 @@ def _chunks(
         yield triangle[start : start + count], np.minimum(pixel, window.size - 1, out=pixel)
 
 
-def _hits(
-    mesh: Mesh,
-    corners: FloatArray,
-    rays: RayTable,
-    triangle: IntArray,
-    pixel: IntArray,
-    backface_culling: bool,
-) -> tuple[IntArray, FloatArray, IntArray]:
-    """Pixels, s and triangles (F,) of the pairs that meet; see `see` for the arguments."""
-    forms = forms_of(*(corners.take(corner.take(triangle), axis=1) for corner in mesh.triangles))
+def _sides(forms: Forms, rays: RayTable, pixel: IntArray) -> tuple[BoolArray, BoolArray]:
+    """Which pairs of pixels (k, N) and triangles (N,) meet, seen from in front and from behind."""
     b, m, kappa, omega = (part.take(pixel) for part in (rays.b, rays.m, rays.kappa, rays.omega))
     eta = None if rays.eta is None else rays.eta.take(pixel)
-    front = back = None
+    front = back = np.ones(pixel.shape, dtype=np.bool_)
     for edge in forms.edges:
         before, behind = sides(edge, edge_values(edge, b, m, kappa, omega, eta))
-        front = before if front is None else np.logical_and(front, before, out=front)
-        if not backface_culling:
-            back = behind if back is None else np.logical_and(back, behind, out=back)
-    assert front is not None
-    hit = front if back is None else np.logical_or(front, back, out=front)
+        front, back = front & before, back & behind
+    return front, back
+
+
+def _straight(
+    mesh: Mesh,
+    x: FloatArray,
+    y: FloatArray,
+    triangle: IntArray,
+    column: FloatArray,
+    row: FloatArray,
+    turn: float,
+) -> tuple[BoolArray, BoolArray]:
+    """As `_sides`, of triangles that are straight between their corners' pixels (V,)."""
+    corners = [(x.take(corner.take(triangle)), y.take(corner.take(triangle))) for corner in mesh.triangles]
+    front = back = np.ones(column.shape, dtype=np.bool_)
+    for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        value = turn * ((x1 - x0) * (row - y0) - (y1 - y0) * (column - x0))
+        front, back = front & (value > 0), back & (value < 0)
+    return front, back
+
+
+def _samples(window: Window, pixel: IntArray, sample: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Where the samples of a window's pixels lie in the picture."""
+    row, column = np.divmod(pixel, window.width)
+    return column + (window.x + 0.5 + sample[0]), row + (window.y + 0.5 + sample[1])
+
+
+def _met(
+    forms: Forms, rays: RayTable, pixel: IntArray, hit: BoolArray
+) -> tuple[IntArray, FloatArray, IntArray]:
+    """Pixels, s and columns of `pixel` (F,) of the pairs (k, N) that meet."""
     place = np.flatnonzero(hit)
-    which = place % triangle.size
+    which = place % hit.shape[1]
     found = pixel.reshape(-1).take(place)
     s = distances(
         forms.plane.take(which, axis=1),
@@ -241,7 +269,7 @@ def _hits(
     sound = np.isfinite(s) & (s > 0)  # seen edge-on there is no plane to meet
     if not sound.all():
         found, s, which = found[sound], s[sound], which[sound]
-    return found, s, triangle.take(which)
+    return found, s, which
 
 
 def _within(rays: RayTable, pixel: IntArray, s: FloatArray, limits: Limits) -> IntArray:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
 
 from quiltcli.ring import raster
+from quiltcli.ring.cast import see_by_rays
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.forms import distances, edge_values, forms_of
 from quiltcli.ring.outline import lit_pixels
@@ -17,6 +18,7 @@ from quiltcli.ring.propose import bending, propose
 from quiltcli.ring.raster import Limits, depth, in_frame, see
 from quiltcli.ring.rays import rays_at
 from quiltcli.ring.rig import Rig, Side
+from quiltcli.ring.vertexwise import see_by_vertices
 from quiltcli.visibility.setup.planes import LATTICE
 from tests.helpers.ring_scenes import (
     RING,
@@ -204,3 +206,29 @@ def test_lit_pixels_are_those_that_meet_the_outline(kind: str, aside: bool) -> N
         if ridge:
             inside &= e >= 0
         assert np.array_equal(lit_pixels(whole_rig, where), inside)
+
+
+@pytest.mark.parametrize("culled", [False, True])
+@pytest.mark.parametrize(("angle", "cone", "curve"), [(0.3, False, RING), (2.0, True, TRACKED)])
+def test_rays_and_edge_functions_see_the_same(angle: float, cone: bool, curve: Curve, culled: bool) -> None:
+    mesh, where = mesh_of(*ball()), pose(SIZE, angle, aside=True, cone=cone)
+    limits = Limits(0.01, curve.distance)
+    by_rays = see_by_rays(where, curve, mesh, SIZE, culled, limits)
+    exact = see(where, curve, mesh, SIZE, culled, limits)
+    assert np.array_equal(whole(by_rays, SIZE), whole(exact, SIZE))
+
+
+def test_straight_edges_are_wrong_and_less_so_the_finer_they_are() -> None:
+    mesh, where = mesh_of(*cube()), pose((256, 256))
+    exact = whole(see(where, RING, mesh, (256, 256)), (256, 256))
+    wrong = [
+        int(
+            (
+                whole(see_by_vertices(where, RING, mesh, (256, 256), tessellate=most), (256, 256)) != exact
+            ).sum()
+        )
+        for most in (100.0, 0.5, 0.05, 0.005)
+    ]
+    assert wrong[0] > 200
+    assert all(more > 3 * less for more, less in pairwise(wrong[1:] + [0])) or wrong[-1] < 5
+    assert wrong == sorted(wrong, reverse=True)
