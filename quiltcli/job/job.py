@@ -274,6 +274,9 @@ class JobFile(FileModel):
             yield ("render", "method"), f"expected {either(RING_METHODS)} beside ring, got {method}"
         if self.layout is not None:
             yield ("layout",), "belongs to a display of facets (expected no such key beside ring)"
+        if self.lightfield is not None and self.render.samples > 1:
+            words = f"expected 1 beside lightfield, whose pictures are filtered, got {self.render.samples}"
+            yield ("render", "samples"), words
         if self.render.depth_bits is not None:
             yield ("render", "depth_bits"), "has no meaning on a ring of viewers (expected no such key)"
         if not (self.output.packed or self.output.tones):
