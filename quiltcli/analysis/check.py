@@ -29,16 +29,22 @@ from quiltcli.job import (
     file_kind,
     load_calibration_file,
     load_display_file,
+    load_job,
     load_lightfield_file,
     load_scene_file,
 )
 from quiltcli.job.layout_table import LayoutTable, read_layout_table
+from quiltcli.job.load import load_mirror_file
+from quiltcli.job.mirror import is_mirror
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.lightfield import load_field
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
+from quiltcli.render.ring.setup import notices as ring_notices
+from quiltcli.render.ring.setup import set_ring_stage
+from quiltcli.ring.build import rig_of
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.viewer.view import facet_problems, view_problems
@@ -123,6 +129,11 @@ class _Findings:
 
 
 def _check_display(findings: _Findings, path: Path) -> None:
+    if is_mirror(parse_yaml(path).data):
+        display = load_mirror_file(path)
+        findings.run(rig_of, display)
+        findings.notices += [f"{path}: {notice}" for notice in display.timing.notices()]
+        return
     facets = findings.facets(path)
     own = load_display_file(path).layout
     if own is not None:
@@ -156,6 +167,9 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if job is None:
         findings.named_in(path)
         return
+    if job.ring is not None:
+        _check_ring(findings, path)
+        return
     found = view_problems(job, job.frames)
     findings.problems += found
     facets = findings.facets(job.display)
@@ -170,12 +184,17 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.run(read_layout, choice)
     if facets is not None:
         findings.problems += facet_problems(job, facets.count)
-    if job.lightfield is not None:
-        findings.run(load_field, findings.run(load_lightfield_file, job.lightfield), job.frames)
-        return
     scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is not None and not found:
         findings.notices += stereo_notices(job, facets, scene)
+
+
+def _check_ring(findings: _Findings, path: Path) -> None:
+    """A job of a display with a spinning mirror: all that a render looks at before it begins."""
+    stage = findings.run(set_ring_stage, findings.run(load_job, path))
+    if stage is not None:
+        own = (f"{stage.job.scene}: {notice}" for notice in stage.scene.notices)
+        findings.notices += [*own, *ring_notices(stage)]
 
 
 def _check_calibration(findings: _Findings, path: Path) -> None:

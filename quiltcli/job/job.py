@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from quiltcli.channels import CHANNELS
+from quiltcli.errors import JobError
 from quiltcli.job.halftone import HalftoneSpec
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
 from quiltcli.job.model import (
@@ -235,7 +236,9 @@ class JobFile(FileModel):
         """Everybody who looks, by name; the only viewer has none."""
         if self.viewers is not None:
             return self.viewers
-        assert self.viewer is not None
+        if self.viewer is None:
+            words = "is for a 360° light field display; this needs facets (expected viewer or viewers)"
+            raise JobError(self.source.problem(("ring",), words))
         return {"": self.viewer}
 
     @property

@@ -58,6 +58,11 @@ def load_mirror_file(path: Path | str) -> MirrorDisplayFile:
     return _load(MirrorDisplayFile, found)
 
 
+def is_mirror_file(path: Path | str) -> bool:
+    """Whether a YAML file is a 360° light field display (JobError: it cannot be read)."""
+    return is_mirror(parse_yaml(path).data)
+
+
 def load_any_display(path: Path | str) -> DisplayFile | MirrorDisplayFile:
     """Read a display file of any kind.
 
