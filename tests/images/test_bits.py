@@ -11,8 +11,9 @@ from PIL import Image
 
 from quiltcli.cli.group import main
 from quiltcli.errors import OutputError
-from quiltcli.formats.bitplanes import pack, packed_name, write_packed
+from quiltcli.formats.bitplanes import pack, packed_name, read_packed, write_packed
 from quiltcli.images.bits import packed_files, unpack_files
+from quiltcli.images.diff import diff
 
 
 def stream(folder: Path, order: str = "rgb", first: str = "lsb") -> np.ndarray:
@@ -68,3 +69,19 @@ def test_the_command_says_what_it_wrote_and_refuses_unknown_orders(tmp_path: Pat
     assert "rgb, rbg" in run.output
     assert "lsb or msb" in run.output
     assert not (tmp_path / "b").exists()
+
+
+def test_folders_of_packed_pictures_are_compared_bit_by_bit(tmp_path: Path) -> None:
+    stream(tmp_path / "a" / "packed")
+    stream(tmp_path / "b" / "packed")
+    assert diff(tmp_path / "a", tmp_path / "b").code == 0
+    path = tmp_path / "b" / "packed" / packed_name(2)
+    packed = read_packed(path).copy()
+    packed[3, 2, 1] ^= 4
+    write_packed(path, packed)
+    result = diff(tmp_path / "a", tmp_path / "b")
+    assert [(file.name, file.code) for file in result.files] == [
+        ("packed/dvi.00000001.png", 0),
+        ("packed/dvi.00000002.png", 2),
+    ]
+    assert [row.first for row in result.files[1].channels if row.over] == [(2, 3)]
