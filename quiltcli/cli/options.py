@@ -100,6 +100,26 @@ def _point(text: str) -> tuple[float, ...]:
     return point
 
 
+def _numbers(text: str, count: int, what: str) -> tuple[float, ...]:
+    try:
+        found = tuple(map(float, text.split(",")))
+    except ValueError:
+        found = ()
+    if len(found) != count or not all(abs(value) < float("inf") for value in found):
+        raise JobError(f"expected {what}, got {text!r}")
+    return found
+
+
+def _pair(text: str) -> tuple[float, ...]:
+    return _numbers(text, 2, "two numbers, such as 0.02,0")
+
+
+def _eye(text: str) -> str | tuple[float, ...]:
+    if text in ("left", "right"):
+        return text
+    return _numbers(text, 3, "left, right, or an azimuth, height and distance such as 40,0.4,1")
+
+
 def _area(text: str) -> tuple[float, ...]:
     try:
         area = tuple(map(float, text.split(",")))
@@ -146,6 +166,8 @@ POSITIONS = Parsed("positions", _positions)
 SIZE = Parsed("size", _size)
 ASPECT = Parsed("aspect", _aspect)
 POINT = Parsed("point", _point)
+PAIR = Parsed("pair", _pair)
+EYE = Parsed("eye", _eye)
 AREA = Parsed("area", _area)
 PACKING_METHOD = Words(_packing_methods)
 RENDER_METHOD = Words(_render_methods)
