@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray, cross, dot, normalized
+from quiltcli.lightfield import Field, Rays, rebin
 from quiltcli.ring.cast import Lines, Target, cast, lines_of
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.hits import EYE
@@ -59,7 +60,9 @@ def upright(pose: Pose, eye: FloatArray, x: FloatArray, y: FloatArray) -> FloatA
 
 
 def light_along(show: Show, target: Target, lines: Lines) -> Float32Array:
-    """Light (N, 3) that comes along rays of the scene."""
+    """Light (N, 3) that comes along rays of the scene, or of the light field in its place."""
+    if show.field is not None:
+        return _photographed(show.field, lines, show.frame)
     scene = show.scene
     found = np.tile(scene.background.astype(np.float32), (len(lines.eye), 1))
     for start in range(0, len(found), _CHUNK):
@@ -70,6 +73,14 @@ def light_along(show: Show, target: Target, lines: Lines) -> Float32Array:
         if row.size:
             found[row + start] = _shaded(scene, target, Lines(some.eye[row], some.along[row]), triangle[row])
     return found
+
+
+def _photographed(field: Field, lines: Lines, frame: int) -> Float32Array:
+    """Light (N, 3) of a light field along rays, which are looked up where they pass the axis."""
+    x, z, ex, ez = lines.along[:, 0], lines.along[:, 2], lines.eye[:, 0], lines.eye[:, 2]
+    reach = -(ex * x + ez * z) / (x * x + z * z)
+    place = lines.eye + reach[:, None] * lines.along
+    return rebin(field, Rays(lines.eye, place, lines.eye.mean(axis=0)), frame)
 
 
 def _shaded(scene: Scene, target: Target, lines: Lines, triangle: np.ndarray) -> Float32Array:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from quiltcli.analysis.ring.simulate import EyeOptions, look_at_display
 from quiltcli.cli.group import main
 from quiltcli.errors import JobError
 from quiltcli.job import load_job
@@ -68,3 +69,12 @@ def test_missing_views_stop_a_turn_before_it_begins(jobs: tuple[Path, Path], tmp
 def test_several_samples_are_not_for_photographs(jobs: tuple[Path, Path]) -> None:
     with pytest.raises(JobError, match=r"render\.samples: expected 1 beside lightfield"):
         load_job(jobs[1], ["render.samples=4"])
+
+
+def test_an_eye_sees_the_photographs_and_they_are_what_it_is_held_against(jobs: tuple[Path, Path]) -> None:
+    options = EyeOptions(eye=(40.0, 0.4, 1.0), size=(96, 72), tones=True)
+    found, scene = (look_at_display(load_job(path), 1, options) for path in jobs[::-1])
+    assert found.direct.max() > 0.1
+    assert -10 * np.log10(np.mean((found.direct - scene.direct) ** 2)) > 24
+    assert found.comparison is not None
+    assert found.comparison.psnr > 24
