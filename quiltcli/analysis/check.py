@@ -30,11 +30,15 @@ from quiltcli.job import (
     load_scene_file,
 )
 from quiltcli.job.layout_table import LayoutTable, read_layout_table
+from quiltcli.job.load import load_mirror_file
+from quiltcli.job.mirror import is_mirror
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
+from quiltcli.render.ring.setup import notices, set_ring_stage
+from quiltcli.ring.build import rig_of
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.viewer.view import facet_problems, view_problems
@@ -119,6 +123,11 @@ class _Findings:
 
 
 def _check_display(findings: _Findings, path: Path) -> None:
+    if is_mirror(parse_yaml(path).data):
+        display = load_mirror_file(path)
+        findings.run(rig_of, display)
+        findings.notices += display.timing.notices()
+        return
     facets = findings.facets(path)
     own = load_display_file(path).layout
     if own is not None:
@@ -152,6 +161,9 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if job is None:
         findings.named_in(path)
         return
+    if job.ring is not None:
+        _check_turns(findings, job)
+        return
     found = view_problems(job, job.frames)
     findings.problems += found
     facets = findings.facets(job.display)
@@ -169,6 +181,15 @@ def _check_job(findings: _Findings, path: Path) -> None:
     scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is not None and not found:
         findings.notices += stereo_notices(job, facets, scene)
+
+
+def _check_turns(findings: _Findings, job: JobFile) -> None:
+    """A job with a ring of viewers: its display, scene and viewers together."""
+    display = findings.run(load_mirror_file, job.display)
+    scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
+    if display is not None and scene is not None:
+        stage = findings.run(set_ring_stage, job)
+        findings.notices += notices(stage) if stage is not None else ()
 
 
 def _job_alone(path: Path) -> JobFile | None:

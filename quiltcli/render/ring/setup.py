@@ -87,7 +87,7 @@ class RingStage:
             backface_culling=render.backface_culling,
             near=self.ring.near,
             far=self.ring.farthest,
-            see=METHODS[render.method],
+            see=METHODS.get(render.method, see),
         )
 
 
