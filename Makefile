@@ -53,6 +53,7 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) path scenes/demo_cave.yaml -o $(DOCS)/take.png
 	$(QUILT) simulate scenes/demo_cave.yaml -f 120 -o $(DOCS)/cave-take.png --size 960x600 --supersample 2 --third-person
 	mv $(DOCS)/cave-take.left.png $(DOCS)/cave-take.png && rm $(DOCS)/cave-take.right.png
+	$(PY) -m tests.benchmarks.halftones --write docs/halftones.md --picture $(DOCS)/halftones.png
 	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
 
 test: env lint types ## lint, types and all tests but the long ones

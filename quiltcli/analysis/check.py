@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
+from quiltcli.display.clicks import calibrate
 from quiltcli.display.notices import display_notices
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
@@ -26,7 +27,10 @@ from quiltcli.job import (
     SceneFile,
     check_file,
     file_kind,
+    load_calibration_file,
     load_display_file,
+    load_job,
+    load_lightfield_file,
     load_scene_file,
 )
 from quiltcli.job.layout_table import LayoutTable, read_layout_table
@@ -35,9 +39,11 @@ from quiltcli.job.mirror import is_mirror
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
+from quiltcli.lightfield import load_field
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
-from quiltcli.render.ring.setup import notices, set_ring_stage
+from quiltcli.render.ring.setup import notices as ring_notices
+from quiltcli.render.ring.setup import set_ring_stage
 from quiltcli.ring.build import rig_of
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
@@ -126,7 +132,7 @@ def _check_display(findings: _Findings, path: Path) -> None:
     if is_mirror(parse_yaml(path).data):
         display = load_mirror_file(path)
         findings.run(rig_of, display)
-        findings.notices += display.timing.notices()
+        findings.notices += [f"{path}: {notice}" for notice in display.timing.notices()]
         return
     facets = findings.facets(path)
     own = load_display_file(path).layout
@@ -162,7 +168,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.named_in(path)
         return
     if job.ring is not None:
-        _check_turns(findings, job)
+        _check_ring(findings, path)
         return
     found = view_problems(job, job.frames)
     findings.problems += found
@@ -183,13 +189,23 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.notices += stereo_notices(job, facets, scene)
 
 
-def _check_turns(findings: _Findings, job: JobFile) -> None:
-    """A job with a ring of viewers: its display, scene and viewers together."""
-    display = findings.run(load_mirror_file, job.display)
-    scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
-    if display is not None and scene is not None:
-        stage = findings.run(set_ring_stage, job)
-        findings.notices += notices(stage) if stage is not None else ()
+def _check_ring(findings: _Findings, path: Path) -> None:
+    """A job of a display with a spinning mirror: all that a render looks at before it begins."""
+    stage = findings.run(set_ring_stage, findings.run(load_job, path))
+    if stage is not None:
+        own = (f"{stage.job.scene}: {notice}" for notice in stage.scene.notices)
+        findings.notices += [*own, *ring_notices(stage)]
+
+
+def _check_calibration(findings: _Findings, path: Path) -> None:
+    findings.run(calibrate, findings.run(load_calibration_file, path))
+
+
+def _check_lightfield(findings: _Findings, path: Path) -> None:
+    file = findings.run(load_lightfield_file, path)
+    # Of what moves, the job says the frames.
+    frames = () if file is not None and file.is_animated else (1,)
+    findings.run(load_field, file, frames)
 
 
 def _job_alone(path: Path) -> JobFile | None:
@@ -208,4 +224,6 @@ CHECKS: dict[str, Callable[[_Findings, Path], None]] = {
     "quilt_layout": _check_layout,
     "quilt_scene": _check_scene,
     "quilt_job": _check_job,
+    "quilt_lightfield": _check_lightfield,
+    "quilt_calibration": _check_calibration,
 }

@@ -12,7 +12,9 @@ from quiltcli.job.layout_table import read_layout_table
 from quiltcli.job.load import (
     file_kind,
     load_any_display,
+    load_calibration_file,
     load_job,
+    load_lightfield_file,
     load_scene_file,
     tried,
 )
@@ -36,4 +38,6 @@ _LOAD: dict[str, Callable[[Path], object]] = {
     "quilt_display": load_any_display,
     LayoutFile.kind: read_layout_table,
     "quilt_scene": load_scene_file,
+    "quilt_lightfield": load_lightfield_file,
+    "quilt_calibration": load_calibration_file,
 }

@@ -8,9 +8,19 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeAlias
 
-from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainValidator,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
 
 from quiltcli.channels import CHANNELS
+from quiltcli.errors import JobError
 from quiltcli.job.halftone import HalftoneSpec
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
 from quiltcli.job.model import (
@@ -212,6 +222,12 @@ def _shared_facets(viewers: Mapping[str, ViewerSpec]) -> Iterator[Complaint]:
         yield ("viewers", plain), words
 
 
+def _scene_or_lightfield(schema: dict[str, Any]) -> None:
+    """Either of the two is enough."""
+    schema["required"].remove("scene")
+    schema["anyOf"] = [{"required": ["scene"]}, {"required": ["lightfield"]}]
+
+
 class JobFile(FileModel):
     """A render job."""
 
@@ -220,7 +236,9 @@ class JobFile(FileModel):
         """Everybody who looks, by name; the only viewer has none."""
         if self.viewers is not None:
             return self.viewers
-        assert self.viewer is not None
+        if self.viewer is None:
+            words = "is for a 360° light field display; this needs facets (expected viewer or viewers)"
+            raise JobError(self.source.problem(("ring",), words))
         return {"": self.viewer}
 
     @property
@@ -232,6 +250,8 @@ class JobFile(FileModel):
         """One viewer or several, each facet for one; the canonical depth lies between two planes."""
         yield from exactly_one(self, "viewer", "viewers", *(("ring",) if self.ring is not None else ()))
         yield from self._ring_checks()
+        if self.lightfield is not None and self.scene != self.lightfield:
+            yield ("lightfield",), "cannot stand beside scene (expected one or the other)"
         if self.viewer is not None and self.viewer.facets is not None:
             yield ("viewer", "facets"), "belongs to one of several viewers (expected viewers: {NAME: …})"
         yield from _shared_facets(self.viewers or {})
@@ -248,6 +268,8 @@ class JobFile(FileModel):
         if self.ring is None:
             if self.halftone is not None:
                 yield ("halftone",), "belongs to a 360° light field display (expected no such key)"
+            if self.lightfield is not None:
+                yield ("lightfield",), "belongs to a 360° light field display (expected scene)"
             if method in ("exact", "vertex"):
                 yield ("render", "method"), f"expected {either(METHODS)} beside viewer, got {method}"
             return
@@ -255,6 +277,9 @@ class JobFile(FileModel):
             yield ("render", "method"), f"expected {either(RING_METHODS)} beside ring, got {method}"
         if self.layout is not None:
             yield ("layout",), "belongs to a display of facets (expected no such key beside ring)"
+        if self.lightfield is not None and self.render.samples > 1:
+            words = f"expected 1 beside lightfield, whose pictures are filtered, got {self.render.samples}"
+            yield ("render", "samples"), words
         if self.render.depth_bits is not None:
             yield ("render", "depth_bits"), "has no meaning on a ring of viewers (expected no such key)"
         if not (self.output.packed or self.output.tones):
@@ -262,6 +287,15 @@ class JobFile(FileModel):
         if "rgba" not in self.output.channels:
             yield ("output", "channels"), "expected rgba among them: light is made of it"
 
+    @model_validator(mode="before")
+    @classmethod
+    def _content(cls, data: Any) -> Any:
+        """A light field is what is to be seen, too: it stands in the scene's place."""
+        if isinstance(data, dict) and "lightfield" in data and "scene" not in data:
+            return {**data, "scene": data["lightfield"]}
+        return data
+
+    model_config = ConfigDict(json_schema_extra=_scene_or_lightfield)
     kind: ClassVar[str] = "quilt_job"
 
     quilt_job: Annotated[int, Field(ge=1, le=1)] = 1
@@ -272,6 +306,8 @@ class JobFile(FileModel):
     """Layout file, or how to pack; the display's own layout or the packing defaults when absent."""
     scene: ScenePath
     """Scene file, or a mesh or glTF file."""
+    lightfield: YamlPath | None = None
+    """Light field file, photographs for a 360° light field display to show, instead of `scene`."""
     frames: FrameRange
     """Frames to render: 1-240, 1-9x2, 1,5,20-30."""
     fps: Annotated[

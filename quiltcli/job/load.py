@@ -1,4 +1,4 @@
-"""Read the four kinds of file into their models, with every problem of a file in one error."""
+"""Read every kind of file into its model, with every problem of a file in one error."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from quiltcli.errors import JobError, Problem
 from quiltcli.formats.inputs import check_input
 from quiltcli.formats.yaml.source import Source, YamlFile, parse_text, parse_yaml
 from quiltcli.formats.yaml.syntax import read_text
+from quiltcli.job.calibration import CalibrationFile
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.job import RING_METHODS, JobFile
 from quiltcli.job.layout import LayoutFile, PackSpec
+from quiltcli.job.lightfield import LightfieldFile
 from quiltcli.job.messages import KINDS, NO_KIND, problems_of, version_problem
 from quiltcli.job.mirror import KIND, MirrorDisplayFile, is_mirror
 from quiltcli.job.model import MESHES, YAMLS, FileModel, attach
@@ -26,7 +28,7 @@ M = TypeVar("M", bound=FileModel)
 T = TypeVar("T")
 _FIRST_KEY = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\n)*(\w+):")
 MODELS: dict[str, type[FileModel]] = {
-    **{m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile)},
+    **{m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile, LightfieldFile, CalibrationFile)},
     "quilt_lightfield360": MirrorDisplayFile,
 }
 
@@ -54,6 +56,11 @@ def load_mirror_file(path: Path | str) -> MirrorDisplayFile:
     if not is_mirror(found.data) and "kind" not in found.data and DisplayFile.kind in found.data:
         raise JobError(found.source.problem((), f"is a display of facets (expected kind: {KIND})"))
     return _load(MirrorDisplayFile, found)
+
+
+def is_mirror_file(path: Path | str) -> bool:
+    """Whether a YAML file is a 360° light field display (JobError: it cannot be read)."""
+    return is_mirror(parse_yaml(path).data)
 
 
 def load_any_display(path: Path | str) -> DisplayFile | MirrorDisplayFile:
@@ -94,6 +101,24 @@ def load_scene_file(path: Path | str) -> SceneFile:
     return _load(SceneFile, parse_yaml(path))
 
 
+def load_lightfield_file(path: Path | str) -> LightfieldFile:
+    """Read a light field file.
+
+    Raises:
+        JobError: with every problem of the file.
+    """
+    return _load(LightfieldFile, parse_yaml(path))
+
+
+def load_calibration_file(path: Path | str) -> CalibrationFile:
+    """Read a calibration file.
+
+    Raises:
+        JobError: with every problem of the file.
+    """
+    return _load(CalibrationFile, parse_yaml(path))
+
+
 def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
     """Read a job file, and look through the display and scene files it names.
 
@@ -116,7 +141,8 @@ def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
         output.setdefault("directory", "out")
     job = _load(JobFile, found)
     problems, display = tried(load_any_display, job.display)
-    problems += tried(load_scene_file, job.scene)[0] if job.scene.suffix.lower() in YAMLS else []
+    if job.scene.suffix.lower() in YAMLS:
+        problems += tried(load_scene_file if job.lightfield is None else load_lightfield_file, job.scene)[0]
     if problems or display is None:
         raise JobError(problems)
     _fits(job, display)
@@ -155,7 +181,7 @@ def pack_spec(**wishes: Any) -> PackSpec:
 
 
 def file_kind(path: Path | str) -> str:
-    """Which kind of file this is: `quilt_display`, `quilt_layout`, `quilt_scene` or `quilt_job`.
+    """Which kind of file this is: `quilt_display`, `quilt_job` and so on.
 
     Raises:
         JobError: it is none of them.

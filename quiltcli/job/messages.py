@@ -213,5 +213,8 @@ def version_problem(data: dict[Any, Any], kind: str, source: Source) -> Problem 
     return None
 
 
-KINDS = ("quilt_display", "quilt_layout", "quilt_scene", "quilt_job")
+KINDS = (
+    *("quilt_display", "quilt_layout", "quilt_scene", "quilt_job"),
+    *("quilt_lightfield", "quilt_calibration"),
+)
 NO_KIND = f"this is no file of quilt's (expected {either([f'{kind}: 1' for kind in KINDS])} as the first key)"

@@ -10,9 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from quiltcli.display.clicks import calibrate
 from quiltcli.errors import JobError, Problem, ViewerError, raise_all
 from quiltcli.formats.inputs import check_input
 from quiltcli.geometry import FloatArray
+from quiltcli.job import load_calibration_file
 from quiltcli.job.mirror import MirrorDisplayFile
 from quiltcli.job.ring import RingSpec
 from quiltcli.ring.curve import Curve, User, overlapping
@@ -25,7 +27,7 @@ def rig_of(display: MirrorDisplayFile) -> Rig:
     """Projector and mirror of a display file.
 
     Raises:
-        JobError: a calibration leads to nothing.
+        JobError, DisplayError: a calibration file is wrong, or its points leave the projector open.
     """
     turn = -1 if display.rotation.direction == "decreasing" else 1
     outline, own = display.mirror.outline, _projector(display)
@@ -61,9 +63,13 @@ def _projector(display: MirrorDisplayFile) -> FloatArray:
         return np.array(spec.matrix)
     if spec.height is not None and spec.diameter is not None:
         return ideal_projector(display.image, spec.height, spec.diameter)
-    raise JobError(
-        spec.source.problem(("calibration",), "run quilt calibrate, and give its display's matrix")
-    )
+    assert spec.calibration is not None
+    clicks = load_calibration_file(spec.calibration)
+    if clicks.image != display.image:
+        sizes = (f"{width} × {height}" for width, height in (clicks.image, display.image))
+        words = "{} is for an image of {} pixels, and the display has {}".format(spec.calibration, *sizes)
+        raise JobError(spec.source.problem(("calibration",), words))
+    return calibrate(clicks).projector.matrix
 
 
 def curve_of(ring: RingSpec, frame: int, rig: Rig) -> Curve:

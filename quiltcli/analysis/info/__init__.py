@@ -7,9 +7,7 @@ from pathlib import Path
 from quiltcli.analysis.info.record import Info
 from quiltcli.formats.inputs import name_fault
 from quiltcli.formats.mesh.read import SUFFIXES
-from quiltcli.formats.yaml.source import parse_yaml
 from quiltcli.job import file_kind
-from quiltcli.job.mirror import is_mirror
 
 __all__ = ["Info", "describe"]
 
@@ -41,17 +39,15 @@ def _yaml_info(kind: str, path: Path) -> Info:
     from quiltcli.analysis.info.displays import display_info
     from quiltcli.analysis.info.jobs import job_info
     from quiltcli.analysis.info.layouts import layout_info
+    from quiltcli.analysis.info.rings import calibration_info, lightfield_info
     from quiltcli.analysis.info.scenes import scene_info
 
-    data = parse_yaml(path).data if kind in ("quilt_display", "quilt_job") else {}
-    if is_mirror(data) or "ring" in data:
-        from quiltcli.analysis.info.rings import mirror_info, ring_job_info
-
-        return mirror_info(path) if is_mirror(data) else ring_job_info(path)
     tell = {
         "quilt_display": display_info,
         "quilt_layout": layout_info,
         "quilt_scene": scene_info,
         "quilt_job": job_info,
+        "quilt_lightfield": lightfield_info,
+        "quilt_calibration": calibration_info,
     }
     return tell[kind](path)

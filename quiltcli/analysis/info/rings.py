@@ -1,125 +1,71 @@
-"""What a 360° light field display is, and a job for it."""
+"""What files of a display with a spinning mirror are: light fields and calibrations."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from quiltcli.analysis.info.record import Info, number, size, vector
-from quiltcli.job import job_sha256, load_job
-from quiltcli.job.dump import plain
-from quiltcli.job.frames import format_frames
-from quiltcli.job.load import load_mirror_file
-from quiltcli.job.mirror import MirrorDisplayFile
-from quiltcli.ring.build import rig_of
-from quiltcli.ring.rig import Rig
-from quiltcli.ring.seen import slices_seen
-
-_DISTANCES = (0.56, 1.0, 3.0, math.inf)
+from quiltcli.analysis.info.record import Info, counted, number
+from quiltcli.calibration import clicks
+from quiltcli.job import load_lightfield_file
+from quiltcli.lightfield import load_field
 
 
-def mirror_info(path: Path) -> Info:
-    """Projector, mirror and timing of such a display.
+def calibration_info(path: Path) -> Info:
+    """The projector that a calibration file gives, and by how much its points are off.
 
     Raises:
-        JobError: the file is wrong.
+        JobError, DisplayError: the file is wrong, or its points leave the projector open.
     """
-    display = load_mirror_file(path)
-    rig = rig_of(display)
-    pose, timing = rig.at(rig.first), display.timing
-    seen = pose.to_world(np.zeros(3))
-    pitch = _pitch(rig)
-    data = {
-        "path": str(path),
-        "display": plain(display, str),
-        "projector": (np.round(pose.eye, 12) + 0.0).tolist(),
-        "projector_mirrored": (np.round(seen, 12) + 0.0).tolist(),
-        "pixels_per_mm": pitch,
-        "images_per_second": timing.images_a_second,
-        "turns_per_second": timing.turns_a_second,
-        "rpm": timing.rpm,
-        "slices": {number(d): slices_seen(rig, d) for d in _DISTANCES if d < math.inf},
-        "notices": list(timing.notices()),
-    }
-    return Info("display", data, list(_lines(display, rig, data)))
+    file, found = clicks.calibrate_file(path)
+    data: dict[str, Any] = {"path": str(path), **clicks.figures(found)}
+    return Info("calibration", data, clicks.lines(found), clicks.COLUMNS, clicks.rows(file, found))
 
 
-def _lines(display: MirrorDisplayFile, rig: Rig, data: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    outline, timing = display.mirror.outline, display.timing
-    inferred = display.projector.height is not None
-    yield "kind", "lightfield360: a projector above a spinning mirror"
-    yield "picture", f"{size(display.image)} pixels of one bit, {number(data['pixels_per_mm'])} a millimetre"
-    yield "projector", f"at {vector(data['projector'])} m" + " (ideal: on the axis, looking down)" * inferred
-    yield "seen in the mirror", f"at {vector(data['projector_mirrored'])} m, at the first position"
-    form = (
-        f"disk of {outline.disk:g} m"
-        if outline.disk
-        else f"rectangle of {size(map(number, rig.rectangle))} m"  # type: ignore[arg-type]
-    )
-    sides = "one plane" if len(rig.sides) == 1 else "a tent of two planes"
-    yield "mirror", f"{form}, tilted {number(display.mirror.tilt_deg)}°, {sides}"
-    rotation, lobe = display.rotation, display.diffuser.horizontal_deg
-    yield (
-        "rotation",
-        f"{rotation.positions} positions, {rotation.direction}, {number(360 / rotation.positions)}° each",
-    )
-    yield "diffuser", f"{number(lobe)}° to the sides, light leaves in a {display.diffuser.reflection}"
-    slices = [f"{number(slices_seen(rig, d))} at {d:g} m" for d in _DISTANCES[:3]]
-    yield "positions seen", f"{', '.join(slices)}, {number(slices_seen(rig, 1e9))} from far away"
-    yield "packing", f"{timing.planes} pictures in one, {display.packing.order}, {display.packing.bits} first"
-    rate = f"{number(timing.refresh)} Hz, {number(timing.images_a_second)} pictures and"
-    yield "timing", f"{rate} {number(timing.turns_a_second)} turns a second, {number(timing.rpm)} a minute"
-    for notice in data["notices"]:
-        yield "note", notice
-
-
-def _pitch(rig: Rig) -> float:
-    """Pixels a millimetre at the mirror's middle."""
-    matrix = rig.sides[0].projector
-    here, there = (matrix @ [x, 0.0, 0.0, 1.0] for x in (-5e-4, 5e-4))
-    return float(np.linalg.norm(here[:2] / here[2] - there[:2] / there[2]))
-
-
-def ring_job_info(path: Path) -> Info:
-    """Every value of a job with a ring of viewers, defaults included.
+def lightfield_info(path: Path) -> Info:
+    """Cameras and pictures of a light field.
 
     Raises:
-        JobError: the job or its display is wrong.
+        JobError: the file is wrong, or pictures are missing.
     """
-    job = load_job(path)
-    assert job.ring is not None
-    display = load_mirror_file(job.display)
-    rig = rig_of(display)
-    elevation = math.degrees(math.atan2(job.ring.height, job.ring.distance))
-    values = plain(job, str) | {"frames": format_frames(job.frames)}
-    data = {
+    file = load_lightfield_file(path)
+    field = load_field(file, () if file.is_animated else (1,))
+    cameras = field.cameras
+    width, height = cameras.lens.size
+    steps = [_widest(row.azimuth) for row in cameras.rows]
+    data: dict[str, Any] = {
         "path": str(path),
-        "job": values,
-        "frame_count": len(job.frames),
-        "seconds": len(job.frames) / display.timing.turns_a_second,
-        "elevation_deg": elevation,
-        "slices": slices_seen(rig, job.ring.distance),
-        "sha256": job_sha256(job),
+        "rows": [
+            {"height": row.height, "views": len(row.azimuth), "widest_step_deg": step}
+            for row, step in zip(cameras.rows, steps, strict=True)
+        ],
+        "distance": cameras.distance,
+        "size": [width, height],
+        "focal": cameras.lens.focal.tolist(),
+        "centre": cameras.lens.centre.tolist(),
+        "animated": file.is_animated,
+        "focus": file.focus,
+        "slices": file.slices,
     }
+    views = sum(len(row.azimuth) for row in cameras.rows)
+    focal = cameras.lens.focal[0]
     lines = [
-        ("display", str(job.display)),
-        ("scene", str(job.scene)),
-        ("frames", f"{len(job.frames)}, a turn of {rig.positions} positions each"),
-        (
-            "ring",
-            f"{number(job.ring.height)} m high, {number(job.ring.distance)} m away: {elevation:.1f}° up",
-        ),
-        ("tracked", f"{len(job.ring.users)} users" if job.ring.heads is None else str(job.ring.heads.csv)),
-        ("positions seen", f"{data['slices']:.1f} from the ring"),
-        ("method", job.render.method),
-        ("hash", str(data["sha256"])),
+        ("cameras", f"{views:,} in {counted(len(cameras.rows), 'row')}, {number(cameras.distance)} m away"),
+        ("pictures", f"{width}×{height}, {'of every frame' if file.is_animated else 'still'}"),
+        ("at the axis", f"{number(1000 * cameras.distance / focal)} mm a pixel"),
+        ("focus", file.focus),
+        ("rows are", {"linear": "blended", "nearest": "the nearest one"}.get(file.slices, file.slices)),
     ]
-    if not rig.cone and abs(elevation) > 15:
-        lines.append(
-            ("note", "light leaves in planes, which is off by over half a pixel this high: try a cone")
-        )
-    return Info("job", data, lines)
+    rows = [
+        [str(i), number(row.height), f"{len(row.azimuth):,}", f"{step:.4g}"]
+        for i, (row, step) in enumerate(zip(cameras.rows, steps, strict=True), start=1)
+    ]
+    return Info("lightfield", data, lines, ("row", "height m", "views", "widest step deg"), rows)
+
+
+def _widest(azimuth: Any) -> float:
+    """The widest gap between neighbours, degrees."""
+    turn = np.concatenate((azimuth, azimuth[:1] + 2 * np.pi))
+    return float(np.degrees(np.diff(turn).max()))

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from quiltcli.errors import Problem, SceneError, ViewerError, raise_all
-from quiltcli.job import JobFile, load_scene_file
+from quiltcli.job import JobFile, load_lightfield_file, load_scene_file
 from quiltcli.job.halftone import HalftoneSpec
 from quiltcli.job.load import load_mirror_file
 from quiltcli.job.mirror import MirrorDisplayFile
 from quiltcli.job.ring import RingSpec
+from quiltcli.lightfield import Field, load_field
 from quiltcli.render.antialiasing import sample_places
 from quiltcli.ring.build import curve_of, rig_of, scene_problems
 from quiltcli.ring.cast import see_by_rays
@@ -22,6 +23,7 @@ from quiltcli.ring.rig import Rig
 from quiltcli.ring.tones import shortest_dwell
 from quiltcli.ring.vertexwise import see_by_vertices
 from quiltcli.scene import Scene
+from quiltcli.scene.bare import empty_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
 
@@ -39,6 +41,7 @@ class RingStage:
         rig: projector and mirror.
         scene: the scene as it is at its start.
         source: gives the scene of each frame; None where nothing moves.
+        photographs: the light field that is shown instead of the scene, which is empty then.
         shortest: least time that a pixel dwells on a viewer, where that is made up for; else 1.
     """
 
@@ -49,6 +52,7 @@ class RingStage:
     scene: Scene
     source: SceneSource | None
     shortest: float
+    photographs: Field | None = None
     _meshes: list[tuple[Scene, Mesh]] = field(default_factory=list)
 
     @property
@@ -69,11 +73,11 @@ class RingStage:
         """
         scene = self.source.scene_at(frame) if self.source else self.scene
         curve = curve_of(self.ring, frame, self.rig)
-        problems = scene_problems(scene.vertices, self.rig, curve)
-        blame = load_scene_file(self.job.scene).source
-        raise_all(
-            SceneError, [blame.problem((), f"at frame {frame} the scene {words}") for words in problems]
-        )
+        problems = list(scene_problems(scene.vertices, self.rig, curve))
+        if problems:
+            blame = load_scene_file(self.job.scene).source
+            told = [blame.problem((), f"at frame {frame} the scene {words}") for words in problems]
+            raise SceneError(told)
         if not self._meshes or self._meshes[0][0] is not scene:
             self._meshes[:] = [(scene, mesh_of(scene.vertices, scene.triangles))]
         render, channels = self.job.render, self.job.output.channels
@@ -87,7 +91,9 @@ class RingStage:
             backface_culling=render.backface_culling,
             near=self.ring.near,
             far=self.ring.farthest,
-            see=METHODS.get(render.method, see),
+            see=METHODS[render.method],
+            field=self.photographs,
+            frame=frame,
         )
 
 
@@ -100,12 +106,17 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
     assert job.ring is not None
     display = load_mirror_file(job.display)
     rig = rig_of(display)
-    scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))
     frames = list(job.frames if frames is None else frames)
+    photographs = None
+    if job.lightfield is not None:
+        photographs = load_field(load_lightfield_file(job.lightfield), frames)
+        scene, source = empty_scene(), None
+    else:
+        scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))
     raise_all(SceneError, source.problems(frames) if source else ())
     compensate = job.halftone is not None and job.halftone.compensate == "dwell"
     shortest = shortest_dwell(rig) if compensate else 1.0
-    stage = RingStage(job, display, job.ring, rig, scene, source, shortest)
+    stage = RingStage(job, display, job.ring, rig, scene, source, shortest, photographs)
     problems: list[Problem] = []
     for frame in frames if job.ring.heads is not None else frames[:1]:
         try:
