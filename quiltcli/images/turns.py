@@ -30,6 +30,12 @@ def is_ring_output(out: Path) -> bool:
     return isinstance(report, dict) and report.get("kind") == KIND
 
 
+def frames_in(out: Path) -> tuple[int, ...]:
+    """Frames whose turns a folder holds (OutputError)."""
+    report = json.loads(read_input(out / "report.json", OutputError))
+    return tuple(int(entry["frame"]) for entry in report["frames"])
+
+
 def turn_pictures(out: Path, width: int, frames: Sequence[int] | None) -> Iterator[tuple[str, Bytes]]:
     """Labels and small pictures (h, w, 3) of up to 24 mirror positions of each turn.
 
@@ -43,7 +49,7 @@ def turn_pictures(out: Path, width: int, frames: Sequence[int] | None) -> Iterat
     """
     display = load_mirror_file(out / "display.yaml")
     report = json.loads(read_input(out / "report.json", OutputError))
-    there = [int(entry["frame"]) for entry in report["frames"]]
+    there = frames_in(out)
     for frame in there[:1] if frames is None else frames:
         if frame not in there:
             raise OutputError(Problem(f"has no turn of frame {frame}", str(out)))

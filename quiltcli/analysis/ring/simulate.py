@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -96,6 +96,17 @@ def eye_place(eye: tuple[float, float, float]) -> FloatArray:
     """World place (3,) of an eye at an azimuth in degrees, a height and a distance."""
     turn = math.radians(eye[0])
     return np.array([eye[2] * math.cos(turn), eye[1], eye[2] * math.sin(turn)])
+
+
+def seen_light(stage: RingStage, frame: int, eyes: Iterable[EyeOptions]) -> Iterator[Float32Array]:
+    """What eyes see of a frame's turn, (H, W, 3) linear light each, and nothing beside it."""
+    show = stage.show(frame)
+    target = aim_at(show.mesh)
+    for options in eyes:
+        assert options.eye is not None
+        camera = camera_at(eye_place(options.eye), stage.rig.radius * 1.1, options.size)
+        seen = _seen(stage, show, target, frame, camera, options)
+        yield np.broadcast_to(seen.light, (*seen.light.shape[:2], 3)).astype(np.float32)
 
 
 def look_at_display(job: JobFile, frame: int, options: EyeOptions) -> EyePicture:
@@ -271,4 +282,4 @@ def told(found: EyePicture, who: str) -> Iterator[str]:
         yield f"{'against a direct picture':<24} {psnr:.1f} dB, ꟻLIP {flip:.4f}"
 
 
-__all__ = ["EyeOptions", "EyePicture", "default_eyes", "look_at_display", "ray_errors", "told"]
+__all__ = ["EyeOptions", "EyePicture", "default_eyes", "look_at_display", "ray_errors", "seen_light", "told"]
