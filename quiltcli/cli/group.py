@@ -21,6 +21,8 @@ COMMANDS = (
     "contact",
     "diff",
     "export",
+    "farm",
+    "film",
     "import",
     "info",
     "new",

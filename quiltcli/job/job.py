@@ -13,6 +13,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    PlainSerializer,
     PlainValidator,
     Tag,
     WithJsonSchema,
@@ -82,6 +83,21 @@ def _rate(value: Any) -> Fraction:
     return rate
 
 
+def _scale(value: Any) -> Fraction:
+    if isinstance(value, Fraction):
+        return value
+    wrong = complaint(f"expected a share such as 1/4 or 0.5, got {describe(value)}")
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise wrong
+    try:
+        scale = Fraction(value if not isinstance(value, str) or _FRACTION.fullmatch(value) else "none")
+    except (ValueError, ZeroDivisionError, OverflowError):
+        raise wrong from None
+    if not 0 < scale <= 1:
+        raise complaint(f"must be above 0 and at most 1, got {describe(value)}")
+    return scale.limit_denominator(1000)
+
+
 def _layout(value: Any) -> Any:
     if isinstance(value, (str, Path, dict, Model)):
         return value
@@ -135,6 +151,14 @@ class RenderSpec(Model):
     """Drop triangles that face away from the viewer."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
+
+    scale: Annotated[
+        Fraction,
+        PlainValidator(_scale),
+        PlainSerializer(float, return_type=float),
+        WithJsonSchema({"type": ["number", "string"], "examples": [0.5, "1/4"]}),
+    ] = Fraction(1)
+    """Share of the display's pixels across and down, for proxies: 1/4; its layout is packed anew."""
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
@@ -280,6 +304,11 @@ class JobFile(FileModel):
         if self.lightfield is not None and self.render.samples > 1:
             words = f"expected 1 beside lightfield, whose pictures are filtered, got {self.render.samples}"
             yield ("render", "samples"), words
+        if self.render.scale != 1:
+            yield (
+                ("render", "scale"),
+                "belongs to displays of facets (expected a smaller image of the display)",
+            )
         if self.render.depth_bits is not None:
             yield ("render", "depth_bits"), "has no meaning on a ring of viewers (expected no such key)"
         if not (self.output.packed or self.output.tones):
