@@ -309,6 +309,11 @@ class JobFile(FileModel):
         if self.lightfield is not None and self.render.samples > 1:
             words = f"expected 1 beside lightfield, whose pictures are filtered, got {self.render.samples}"
             yield ("render", "samples"), words
+        if self.render.scale != 1:
+            yield (
+                ("render", "scale"),
+                "belongs to displays of facets (expected a smaller image of the display)",
+            )
         if self.render.depth_bits is not None:
             yield ("render", "depth_bits"), "has no meaning on a ring of viewers (expected no such key)"
         if not (self.output.packed or self.output.tones):
