@@ -62,7 +62,9 @@ pictures: env ## make the pictures of the README anew
 	rm -rf out/lab && $(QUILT) new cave -o out/lab --size 3x3x3m --pixels 512x512
 	$(QUILT) simulate out/lab/job.yaml -f 1 -o $(DOCS)/cave-lab.png --third-person --from 2.6,3.4,5.2 --size 640x400 --supersample 3
 	$(PY) docs/pictures/reduce.py $(DOCS)/wall-*.png $(DOCS)/cave-lab.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
+	$(PY) -m tests.benchmarks.halftones --write docs/halftones.md --picture $(DOCS)/halftones.png
+	$(PY) docs/pictures/lightfield.py $(DOCS)/lightfield.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2

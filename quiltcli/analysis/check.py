@@ -17,6 +17,7 @@ from quiltcli.analysis.delivery import delivery_problems
 from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
 from quiltcli.display.check import called
+from quiltcli.display.clicks import calibrate
 from quiltcli.display.notices import display_notices
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
@@ -29,17 +30,26 @@ from quiltcli.job import (
     SceneFile,
     check_file,
     file_kind,
+    load_calibration_file,
     load_display_file,
+    load_job,
+    load_lightfield_file,
     load_scene_file,
 )
 from quiltcli.job.layout_table import LayoutTable, read_layout_table
+from quiltcli.job.load import load_mirror_file
+from quiltcli.job.mirror import is_mirror
 from quiltcli.job.model import attach
 from quiltcli.layout import Layout, align, read_layout
 from quiltcli.layout.from_job import layout_for
+from quiltcli.lightfield import load_field
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
+from quiltcli.render.ring.setup import notices as ring_notices
+from quiltcli.render.ring.setup import set_ring_stage
 from quiltcli.render.setup import facets_and_layout
 from quiltcli.render.unseen import unseen_notices
+from quiltcli.ring.build import rig_of
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
@@ -136,6 +146,11 @@ class _Findings:
 
 
 def _check_display(findings: _Findings, path: Path) -> None:
+    if is_mirror(parse_yaml(path).data):
+        display = load_mirror_file(path)
+        findings.run(rig_of, display)
+        findings.notices += [f"{path}: {notice}" for notice in display.timing.notices()]
+        return
     facets = findings.facets(path)
     own = load_display_file(path).layout
     if own is not None:
@@ -168,6 +183,9 @@ def _check_job(findings: _Findings, path: Path) -> None:
     job = _job_alone(path)
     if job is None:
         findings.named_in(path)
+        return
+    if job.ring is not None:
+        _check_ring(findings, path)
         return
     found = view_problems(job, job.frames)
     findings.problems += found
@@ -224,6 +242,25 @@ def dark_notices(job: JobFile, facets: Facets) -> Iterator[str]:
         yield f"facet{'s' * (len(dark) > 1)} {named}{more} {words} in every frame: dark"
 
 
+def _check_ring(findings: _Findings, path: Path) -> None:
+    """A job of a display with a spinning mirror: all that a render looks at before it begins."""
+    stage = findings.run(set_ring_stage, findings.run(load_job, path))
+    if stage is not None:
+        own = (f"{stage.job.scene}: {notice}" for notice in stage.scene.notices)
+        findings.notices += [*own, *ring_notices(stage)]
+
+
+def _check_calibration(findings: _Findings, path: Path) -> None:
+    findings.run(calibrate, findings.run(load_calibration_file, path))
+
+
+def _check_lightfield(findings: _Findings, path: Path) -> None:
+    file = findings.run(load_lightfield_file, path)
+    # Of what moves, the job says the frames.
+    frames = () if file is not None and file.is_animated else (1,)
+    findings.run(load_field, file, frames)
+
+
 def _job_alone(path: Path) -> JobFile | None:
     """A job whose own file is right, whatever may be wrong with the files it names."""
     found = parse_yaml(path)
@@ -240,4 +277,6 @@ CHECKS: dict[str, Callable[[_Findings, Path], None]] = {
     "quilt_layout": _check_layout,
     "quilt_scene": _check_scene,
     "quilt_job": _check_job,
+    "quilt_lightfield": _check_lightfield,
+    "quilt_calibration": _check_calibration,
 }

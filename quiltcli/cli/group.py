@@ -13,7 +13,9 @@ from quiltcli.errors import QuiltError
 
 COMMANDS = (
     "assemble",
+    "calibrate",
     "cameras",
+    "capture",
     "check",
     "compare",
     "contact",
@@ -35,6 +37,7 @@ COMMANDS = (
     "stereo",
     "sweetspot",
     "unmap",
+    "unpack",
     "verify",
     "view",
 )

@@ -36,12 +36,24 @@ def pattern(
     display: Path | None,
     overwrite: bool,
 ) -> None:
-    """Draw test patterns for LAYOUT at exact pixels: which facet, which way up, where it ends."""
+    """Draw test patterns for LAYOUT at exact pixels: which facet, which way up, where it ends.
+
+    Of a display file of the kind lightfield360: id, border, grid or white, packed as they are sent.
+    """
     from quiltcli.calibration.pattern import KINDS
     from quiltcli.calibration.pattern_files import write_patterns
     from quiltcli.exchange.pixelmaps import known_display
+    from quiltcli.job.load import is_mirror_file
     from quiltcli.layout import align, read_layout
 
+    if is_mirror_file(layout):
+        from quiltcli.calibration.ring_pattern import KINDS as ON_MIRROR
+        from quiltcli.calibration.ring_pattern import write_ring_patterns
+        from quiltcli.cli.printing import print_files
+
+        wanted = tuple(ON_MIRROR) if "all" in kinds else tuple(dict.fromkeys(kinds))
+        print_files(write_ring_patterns(layout, output, wanted, overwrite=overwrite), output)
+        return
     loaded = read_layout(layout)
     facets = known_display(loaded, display)
     if facets is not None:

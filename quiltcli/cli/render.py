@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import FACETS, OVERWRITE, PATH, SETS, THREADS, frames_option
+from quiltcli.cli.options import FACETS, OVERWRITE, PATH, POSITIONS, SETS, THREADS, frames_option
 from quiltcli.cli.printing import print_aligned
 
 
@@ -20,6 +20,11 @@ from quiltcli.cli.printing import print_aligned
 @OVERWRITE
 @click.option(
     "--facets", type=FACETS, help="Draw only these facets, such as 3,7-9 or left,right, into existing quilts."
+)
+@click.option(
+    "--positions",
+    type=POSITIONS,
+    help="Draw only these mirror positions of a 360° light field display, such as 1-72 or 1-288x12.",
 )
 @THREADS
 @click.option(
@@ -48,6 +53,7 @@ def render(
     resume: bool,
     overwrite: bool,
     facets: tuple[int, ...] | str | None,
+    positions: tuple[int, ...] | None,
     threads: int | None,
     scheduler: str | None,
     progress: str,
@@ -71,6 +77,13 @@ def render(
     if scale is not None:
         sets = (*sets, f"render.scale={scale}")
     loaded = load_job(job, sets)
+    if loaded.ring is not None:
+        if facets is not None or scheduler is not None:
+            raise click.UsageError("--facets and --scheduler are not for 360° light field displays")
+        _render_turns(loaded, frames, output, positions, resume, overwrite, threads or 0, dry_run, profile)
+        return
+    if positions is not None:
+        raise click.UsageError("--positions are a 360° light field display's, and this job's has facets")
     ids = _named(loaded, facets) if isinstance(facets, str) else facets
     options = RenderOptions(frames, output, resume, overwrite, ids, threads or 0, dry_run, strict)
     records = _render(loaded, options, scheduler, progress)
@@ -107,6 +120,33 @@ def _render(job: Any, options: Any, scheduler: str | None, form: str) -> Any:
     else:
         click.echo("every frame is complete already")
     return records
+
+
+def _render_turns(job: Any, *how: Any) -> None:
+    """Render turns of a spinning mirror, with a line a frame on stderr."""
+    from quiltcli.render.interrupt import Stopped
+    from quiltcli.render.ring.walk import RingOptions, render_turns
+
+    frames, output, positions, resume, overwrite, threads, dry_run, profile = how
+    options = RingOptions(frames, output, positions, resume, overwrite, threads, dry_run)
+    try:
+        records = render_turns(job, options, lambda words: click.echo(words, err=True))
+    except Stopped as stopped:
+        click.echo(str(stopped), err=True)
+        sys.exit(stopped.exit_code)
+    if dry_run:
+        click.echo("nothing is wrong with this job")
+    elif not records:
+        click.echo("every frame is complete already")
+    else:
+        click.echo(f"written to {output or job.output.directory}")
+    for record in records if profile else ():
+        click.echo(f"frame {record.frame}: seconds by stage, then those of all workers by what they did")
+        rows = [
+            *record.seconds.items(),
+            *((f"  {name}", each) for name, each in record.counts.seconds.items()),
+        ]
+        print_aligned(("stage", "seconds"), [(name, f"{each:.3f}") for name, each in rows])
 
 
 def _print_profile(records: Any) -> None:

@@ -28,6 +28,7 @@ MATCH, WARN, FAIL, SIZE, FILE = 0, 1, 2, 3, 4
 VERDICTS = ("match", "warn", "fail", "size", "file error")
 
 _BLOCK = 256  # rows compared at a time: bounded memory, and the sums of a file do not depend on the machine
+_PACKED = "dvi.????????.png"
 _FIELD = re.compile(r"#+|%0?\d*d")
 
 
@@ -107,8 +108,8 @@ class DiffResult:
 def diff(a: str | Path, b: str | Path, limits: Limits | None = None) -> DiffResult:
     """Compare two images, two sequences (`page_01.####.exr`, `page_01.%04d.exr`) or two folders.
 
-    Of folders all EXR files below them are compared, by their relative names. Whatever cannot be
-    compared is a verdict (code 4), not an error.
+    Of folders all EXR files and packed pictures of a 360° light field display below them are compared,
+    by their relative names. Whatever cannot be compared is a verdict (code 4), not an error.
     """
     for given in (a, b):
         if fault := name_fault(given):
@@ -133,7 +134,8 @@ def _named_files(given: str | Path) -> Mapping[str, Path] | None:
     """Files of a folder by relative name, of a sequence by frame; None of a single image."""
     path = Path(given)
     if path.is_dir():
-        files = (file for file in path.rglob("*.exr") if not file.name.startswith("."))
+        every = (file for kind in ("*.exr", _PACKED) for file in path.rglob(kind))
+        files = (file for file in every if not file.name.startswith("."))
         return {file.relative_to(path).as_posix(): file for file in files}
     field = _FIELD.search(path.name)
     if not field:

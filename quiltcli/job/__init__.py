@@ -4,6 +4,7 @@ Load a file and every problem in it comes in one `JobError`; every model and par
 `source`, whose `problem(key, message)` points into the file when a later stage finds something.
 """
 
+from quiltcli.job.calibration import CalibrationFile
 from quiltcli.job.check import check_file
 from quiltcli.job.digest import file_sha256, job_sha256
 from quiltcli.job.display import DisplayFile, FacetSpec, PanelSpec, ResolutionSpec, TransformSpec
@@ -20,11 +21,14 @@ from quiltcli.job.layout import (
     read_aspect,
 )
 from quiltcli.job.lengths import UNITS
+from quiltcli.job.lightfield import LightfieldFile
 from quiltcli.job.load import (
     file_kind,
+    load_calibration_file,
     load_display_file,
     load_job,
     load_layout_file,
+    load_lightfield_file,
     load_scene_file,
     pack_spec,
 )
@@ -46,6 +50,7 @@ __all__ = [
     "PACKING_METHODS",
     "UNITS",
     "AmbientLight",
+    "CalibrationFile",
     "CsvSpec",
     "DirectionalLight",
     "DisplayFile",
@@ -56,6 +61,7 @@ __all__ = [
     "KeyframeSpec",
     "LayoutFile",
     "LightSpec",
+    "LightfieldFile",
     "MarkerSpec",
     "MaterialSpec",
     "ObjectSpec",
@@ -80,9 +86,11 @@ __all__ = [
     "file_kind",
     "file_sha256",
     "job_sha256",
+    "load_calibration_file",
     "load_display_file",
     "load_job",
     "load_layout_file",
+    "load_lightfield_file",
     "load_scene_file",
     "pack_spec",
     "read_aspect",

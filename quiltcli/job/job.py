@@ -10,15 +10,19 @@ from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import (
     BeforeValidator,
+    ConfigDict,
     Discriminator,
     Field,
     PlainSerializer,
     PlainValidator,
     Tag,
     WithJsonSchema,
+    model_validator,
 )
 
 from quiltcli.channels import CHANNELS
+from quiltcli.errors import JobError
+from quiltcli.job.halftone import HalftoneSpec
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
 from quiltcli.job.model import (
     YAMLS,
@@ -29,6 +33,7 @@ from quiltcli.job.model import (
     Listed,
     Model,
     OneOf,
+    Positive,
     ScenePath,
     YamlPath,
     complaint,
@@ -37,9 +42,11 @@ from quiltcli.job.model import (
     exactly_one,
 )
 from quiltcli.job.names import NamesSpec
+from quiltcli.job.ring import RingSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
 METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
+RING_METHODS = ("exact", "raycast", "vertex")
 DEPTH_BITS = ("16", "24", "32f")
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
 COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
@@ -127,8 +134,10 @@ class RenderSpec(Model):
 
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
-    method: Annotated[str, OneOf(METHODS)] = "homography"
-    """Render method."""
+    method: Annotated[str, OneOf((*METHODS, "exact", "vertex"))] = "homography"
+    """Render method; on a 360° light field display exact (so where the key is absent), raycast or vertex."""
+    tessellate: Positive | None = None
+    """With method: vertex, how far edges may bend before triangles are divided; 0.05 when absent, pixels."""
     depth_bits: Annotated[
         str | None, BeforeValidator(_bits), WithJsonSchema({"enum": [16, 24, "16", "24", "32f", None]})
     ] = None
@@ -153,7 +162,11 @@ class RenderSpec(Model):
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        return "zv" in channels or self.depth_bits is not None or self.method not in ("homography", "raycast")
+        return (
+            "zv" in channels
+            or self.depth_bits is not None
+            or self.method not in ("homography", *RING_METHODS)
+        )
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Rays have neither a depth buffer nor several samples; depth buffers lie between planes."""
@@ -162,6 +175,8 @@ class RenderSpec(Model):
             yield ("clip",), f"{what} needs a near and a far plane (expected planar or auto), got distance"
         if self.method == "raycast" and self.depth_bits is not None:
             yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
+        if self.tessellate is not None and self.method != "vertex":
+            yield ("tessellate",), f"belongs to method: vertex, got {self.method}"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
 
@@ -175,6 +190,10 @@ class OutputSpec(Model):
     """Write quilt pages."""
     facets: bool = True
     """Write one image a facet."""
+    packed: bool = True
+    """Write the pictures of one bit that a 360° light field display shows, packed."""
+    tones: bool = False
+    """Write what they are made of, an image of every mirror position."""
     channels: Annotated[tuple[Annotated[str, OneOf(tuple(CHANNELS))], ...], Listed, Field(min_length=1)] = (
         "rgba",
         "Z",
@@ -227,6 +246,12 @@ def _shared_facets(viewers: Mapping[str, ViewerSpec]) -> Iterator[Complaint]:
         yield ("viewers", plain), words
 
 
+def _scene_or_lightfield(schema: dict[str, Any]) -> None:
+    """Either of the two is enough."""
+    schema["required"].remove("scene")
+    schema["anyOf"] = [{"required": ["scene"]}, {"required": ["lightfield"]}]
+
+
 class JobFile(FileModel):
     """A render job."""
 
@@ -235,7 +260,9 @@ class JobFile(FileModel):
         """Everybody who looks, by name; the only viewer has none."""
         if self.viewers is not None:
             return self.viewers
-        assert self.viewer is not None
+        if self.viewer is None:
+            words = "is for a 360° light field display; this needs facets (expected viewer or viewers)"
+            raise JobError(self.source.problem(("ring",), words))
         return {"": self.viewer}
 
     @property
@@ -245,7 +272,10 @@ class JobFile(FileModel):
 
     def cross_checks(self) -> Iterator[Complaint]:
         """One viewer or several, each facet for one; the canonical depth lies between two planes."""
-        yield from exactly_one(self, "viewer", "viewers")
+        yield from exactly_one(self, "viewer", "viewers", *(("ring",) if self.ring is not None else ()))
+        yield from self._ring_checks()
+        if self.lightfield is not None and self.scene != self.lightfield:
+            yield ("lightfield",), "cannot stand beside scene (expected one or the other)"
         if self.viewer is not None and self.viewer.facets is not None:
             yield ("viewer", "facets"), "belongs to one of several viewers (expected viewers: {NAME: …})"
         yield from _shared_facets(self.viewers or {})
@@ -256,6 +286,50 @@ class JobFile(FileModel):
             words = "zv lies between a near and a far plane (expected planar or auto), got distance"
             yield ("render", "clip"), words
 
+    def _ring_checks(self) -> Iterator[Complaint]:
+        """What belongs to a ring of viewers alone, and what does not go with it."""
+        method = self.render.method
+        if self.ring is None:
+            if self.halftone is not None:
+                yield ("halftone",), "belongs to a 360° light field display (expected no such key)"
+            if self.lightfield is not None:
+                yield ("lightfield",), "belongs to a 360° light field display (expected scene)"
+            if method in ("exact", "vertex"):
+                yield ("render", "method"), f"expected {either(METHODS)} beside viewer, got {method}"
+            return
+        if "method" in self.render.model_fields_set and method not in RING_METHODS:
+            yield ("render", "method"), f"expected {either(RING_METHODS)} beside ring, got {method}"
+        if self.layout is not None:
+            yield ("layout",), "belongs to a display of facets (expected no such key beside ring)"
+        if self.render.scale != 1:
+            words = (
+                f"belongs to a display of facets (expected no such key beside ring), got {self.render.scale}"
+            )
+            yield ("render", "scale"), words
+        if self.lightfield is not None and self.render.samples > 1:
+            words = f"expected 1 beside lightfield, whose pictures are filtered, got {self.render.samples}"
+            yield ("render", "samples"), words
+        if self.render.scale != 1:
+            yield (
+                ("render", "scale"),
+                "belongs to displays of facets (expected a smaller image of the display)",
+            )
+        if self.render.depth_bits is not None:
+            yield ("render", "depth_bits"), "has no meaning on a ring of viewers (expected no such key)"
+        if not (self.output.packed or self.output.tones):
+            yield ("output",), "nothing to write (expected packed or tones to be true)"
+        if "rgba" not in self.output.channels:
+            yield ("output", "channels"), "expected rgba among them: light is made of it"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _content(cls, data: Any) -> Any:
+        """A light field is what is to be seen, too: it stands in the scene's place."""
+        if isinstance(data, dict) and "lightfield" in data and "scene" not in data:
+            return {**data, "scene": data["lightfield"]}
+        return data
+
+    model_config = ConfigDict(json_schema_extra=_scene_or_lightfield)
     kind: ClassVar[str] = "quilt_job"
 
     quilt_job: Annotated[int, Field(ge=1, le=1)] = 1
@@ -266,6 +340,8 @@ class JobFile(FileModel):
     """Layout file, or how to pack; the display's own layout or the packing defaults when absent."""
     scene: ScenePath
     """Scene file, or a mesh or glTF file."""
+    lightfield: YamlPath | None = None
+    """Light field file, photographs for a 360° light field display to show, instead of `scene`."""
     frames: FrameRange
     """Frames to render: 1-240, 1-9x2, 1,5,20-30."""
     fps: Annotated[
@@ -278,6 +354,10 @@ class JobFile(FileModel):
     """The viewer."""
     viewers: Annotated[dict[str, ViewerSpec], Field(min_length=1)] | None = None
     """Several viewers by name, each with facets of their own, instead of `viewer`."""
+    ring: RingSpec | None = None
+    """Viewers all around a 360° light field display, instead of `viewer`."""
+    halftone: HalftoneSpec | None = None
+    """How tones become bits on a 360° light field display; the defaults when absent."""
     render: RenderSpec = RenderSpec()
     """How pixels are made."""
     output: OutputSpec = OutputSpec()

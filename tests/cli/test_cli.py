@@ -118,7 +118,7 @@ def test_schema_prints_the_schema_of_a_kind(kind: str, tmp_path: Path) -> None:
         (["pattern", "--kind"], "a", ["all"]),
         (["render", "--set"], "render.sam", ["render.samples="]),
         ([], "ver", ["verify"]),
-        (["schema"], "", ["job", "display", "layout", "scene"]),
+        (["schema"], "", ["job", "display", "layout", "scene", "lightfield", "calibration"]),
     ],
 )
 def test_a_shell_completes_commands_and_the_words_that_options_know(

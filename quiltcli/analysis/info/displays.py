@@ -11,7 +11,8 @@ from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, nu
 from quiltcli.display import Facets, load_display, pitch_mm, shared_edges
 from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import FloatArray, IntArray, dot
-from quiltcli.job import DisplayFile, load_display_file
+from quiltcli.job import DisplayFile
+from quiltcli.job.load import load_any_display
 
 _POLYGONS = {3: "triangle", 4: "quadrilateral", 5: "pentagon", 6: "hexagon", 8: "octagon"}
 
@@ -22,7 +23,11 @@ def display_info(path: Path) -> Info:
     Raises:
         JobError, MeshError, DisplayError: the display cannot be built.
     """
-    spec = load_display_file(path)
+    spec = load_any_display(path)
+    if not isinstance(spec, DisplayFile):
+        from quiltcli.analysis.info.mirrors import mirror_info
+
+        return mirror_info(path)
     facets = load_display(spec)
     table = _facet_table(facets)
     data = _display_data(spec, facets) | {"facet_table": table}

@@ -40,6 +40,7 @@ from quiltcli.projection.camera import aimed, frame_display
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.setup import Stage
+from quiltcli.scene.bare import bare_scene
 from quiltcli.viewer.viewer import Viewer
 
 SCENES = ("ghost", "solid", "none")
@@ -191,7 +192,7 @@ def third_person_light(
     points = outline_points(viewer, stage.facets, shown.lit)
     marks = viewer_marks(viewer, points, max(0.018 * size, 6 * thick), max(1.2 * thick, 1.2e-3 * size))
     corners = stage.facets.corners
-    everything = mesh_scene(
+    everything = bare_scene(
         np.concatenate((corners, marks.vertices)),
         np.concatenate((triangles, marks.triangles + len(corners))).astype(np.int32),
     )
