@@ -34,7 +34,7 @@ from quiltcli.job import (
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
-from quiltcli.render.needs import demand_memory
+from quiltcli.render.needs import demand_memory, method_problems
 from quiltcli.render.notices import job_warnings
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
@@ -164,7 +164,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
     if facets is not None:
-        findings.problems += facet_problems(job, facets.count)
+        findings.problems += facet_problems(job, facets.count) + method_problems(job, facets)
     scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is not None and not found:
         findings.notices += stereo_notices(job, facets, scene)

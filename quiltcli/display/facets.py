@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from quiltcli.charts.chart import EDGE_ON, Chart
 from quiltcli.display.edges import SharedEdges, find_shared_edges
 from quiltcli.errors import Problem
 from quiltcli.formats.mesh import polygons
@@ -22,7 +23,7 @@ from quiltcli.geometry import (
     offsets,
     segments,
 )
-from quiltcli.job.display import PlaceOnPage
+from quiltcli.job.places import PlaceOnPage
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,7 @@ class Places:
         mirror: (n,) whether the image is mirrored.
         corner: (n, 2) pixel x, y of the page.
         source: finds lines in the display file.
-        panels: whether the file lists panels, whose places stand with them.
+        keys: where in the file each facet's own entry stands.
     """
 
     facet: Int32Array
@@ -48,19 +49,22 @@ class Places:
     mirror: BoolArray
     corner: Int32Array
     source: Source
-    panels: bool = False
+    keys: Mapping[int, tuple[str | int, ...]]
 
     def problem(self, key: Sequence[str | int], message: str) -> Problem:
         """A problem with the place of a facet: the key begins with `facets` and its id."""
         facet = int(key[1])
-        where = ("panels", facet - 1) if self.panels else ("facets", facet)
-        return self.source.problem((*where, "place"), message)
+        return self.source.problem((*self.keys[facet], "place"), message)
 
 
-def places_of(
-    given: Mapping[int, PlaceOnPage | None], source: Source, *, panels: bool = False
-) -> Places | None:
-    """The places in the quilt that a display file gives, by facet id in ascending order; None without any."""
+def places_of(given: Mapping[int, PlaceOnPage | None], source: Source, *, listed: str = "") -> Places | None:
+    """The places in the quilt that a display file gives, by facet id in ascending order; None without any.
+
+    Args:
+        given: the places.
+        source: finds lines in the display file.
+        listed: key of the list in which the facets' entries stand one by one; they stand by id without.
+    """
     known = {facet: place for facet, place in given.items() if place is not None}
     if not known:
         return None
@@ -71,7 +75,7 @@ def places_of(
         mirror=np.array([place.mirror for place in known.values()], dtype=np.bool_),
         corner=np.array([place.at for place in known.values()], dtype=np.int32),
         source=source,
-        panels=panels,
+        keys={facet: (listed, facet - 1) if listed else ("facets", facet) for facet in known},
     )
 
 
@@ -97,6 +101,8 @@ class Facets:
         uv: (C, 2) texture coordinates of the mesh, v up, or None.
         path: the display file as the user named it, for messages.
         places: facets whose place in the quilt the display file gives; None when it gives none.
+        charts: of F facets those of curved ones, None for flat ones; empty where all are flat. A curved
+            facet's corners, origin and steps are those of a rectangle that stands for it.
     """
 
     names: tuple[str, ...]
@@ -113,6 +119,13 @@ class Facets:
     uv: FloatArray | None
     path: str
     places: Places | None = None
+    charts: tuple[Chart | None, ...] = ()
+
+    @property
+    def curved(self) -> BoolArray:
+        """Which facets (F,) have a chart."""
+        found = [chart is not None for chart in self.charts] or [False] * self.count
+        return np.array(found, dtype=np.bool_)
 
     @property
     def count(self) -> int:
@@ -136,18 +149,24 @@ class Facets:
         for exact in (self.corners, self.origin, self.du, self.dv, self.normal):
             # Adding zero turns −0 into 0.
             digest.update(np.ascontiguousarray(np.round(exact, 9) + 0.0, dtype="<f8").tobytes())
+        for chart in self.charts:
+            digest.update(b"-" if chart is None else chart.record.encode())
         return digest.hexdigest()
 
 
 def lit_facets(facets: Facets, eye: FloatArray) -> BoolArray:
     """Which facets (F,) show an image to an eye (3,): enabled, and lit on the side it is on.
 
-    An eye in a facet's plane, to a billionth of a metre, sees nothing of it.
+    An eye in a facet's plane, to a billionth of a metre, sees nothing of it. A curved facet may be lit in
+    parts, which its pixels tell.
     """
     height = dot(eye - facets.origin, facets.normal)
     if facets.both_sides:
         height = np.abs(height)
-    result: BoolArray = facets.enabled & (height > 1e-9)
+    seen = height > EDGE_ON
+    if facets.charts:
+        seen |= facets.curved
+    result: BoolArray = facets.enabled & seen
     return result
 
 

@@ -13,7 +13,7 @@ from quiltcli.formats.inputs import check_input
 from quiltcli.formats.yaml.source import Source, YamlFile, parse_yaml
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.job import JobFile
-from quiltcli.job.layout import LayoutFile, PackSpec
+from quiltcli.job.layout import LayoutFile, PackSpec, UvLayoutSpec
 from quiltcli.job.messages import KINDS, NO_KIND, problems_of, version_problem
 from quiltcli.job.model import MESHES, YAMLS, FileModel, attach
 from quiltcli.job.overrides import apply_sets
@@ -88,9 +88,21 @@ def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
     if problems or display is None:
         raise JobError(problems)
     if job.layout is None:
-        job = job.model_copy(update={"layout": display.layout or PackSpec()})
+        job = job.model_copy(update={"layout": _default_layout(display)})
+        attach(job, found.source)
+    if display.projection is not None and "depth" not in job.render.model_fields_set:
+        # All around the eye, a plane's depth would draw nothing behind it.
+        render = job.render.model_copy(update={"depth": "radial"})
+        job = job.model_copy(update={"render": render})
         attach(job, found.source)
     return job
+
+
+def _default_layout(display: DisplayFile) -> PackSpec | UvLayoutSpec:
+    """What an absent layout means: the display's own, a projection's picture alone, or packing."""
+    if display.projection is not None and display.projection.place is None:
+        return PackSpec(size=display.projection.pixels, padding=0)
+    return display.layout or PackSpec()
 
 
 def pack_spec(**wishes: Any) -> PackSpec:

@@ -11,7 +11,7 @@ import numpy as np
 
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray
-from quiltcli.projection.planar import quilt_rays
+from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.buffers import Buffers, empty_before, note_drawn, written_blocks
 from quiltcli.render.crew import Crew, Threads
 from quiltcli.render.notices import frame_warnings
@@ -52,7 +52,7 @@ def draw_frame(
         lit &= only
     with clock.stage("bin"):
         crew.begin(stage)
-        rays = quilt_rays(stage.layout, lit, viewer.eye)
+        rays = viewer_rays(stage.layout, stage.facets, lit, viewer)
         binned = crew.bin(viewer, rays)
     frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
     with clock.stage("clear"):

@@ -16,7 +16,7 @@ from quiltcli.images.names import layout_path
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
-from quiltcli.render.needs import demand_memory
+from quiltcli.render.needs import demand_memory, method_problems
 from quiltcli.scene import Scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
@@ -86,7 +86,7 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     """
     kept = layout_path(folder or job.output.directory)
     facets = load_display(load_display_file(job.display))
-    raise_all(JobError, facet_problems(job, facets.count))
+    raise_all(JobError, facet_problems(job, facets.count) + method_problems(job, facets))
     layout = layout_for(job.layout or PackSpec(), facets, kept)
     demand_memory(job, layout)
     scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from quiltcli.ending import SIGNALS
 from quiltcli.geometry import BoolArray
-from quiltcli.projection.planar import quilt_rays
+from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.arena import (
     Arena,
     arena_of,
@@ -80,7 +80,7 @@ class Workplace:
 
     def begin(self, task: Task) -> None:
         """Turn to another frame."""
-        rays = quilt_rays(self._stage.layout, task.lit, task.viewer.eye)
+        rays = viewer_rays(self._stage.layout, self._stage.facets, task.lit, task.viewer)
         self._plan, self._frame = plan_of(self._stage, task.viewer, rays), None
 
     def move(self, moved: Moved, connection: Connection) -> None:

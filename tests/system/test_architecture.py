@@ -12,7 +12,19 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "quiltcli"
 ORDER = (
-    *("ending", "errors", "geometry", "channels", "formats", "job", "display", "scene", "viewer", "layout"),
+    *(
+        "ending",
+        "errors",
+        "geometry",
+        "channels",
+        "formats",
+        "job",
+        "charts",
+        "display",
+        "scene",
+        "viewer",
+        "layout",
+    ),
     *("projection", "visibility", "shading", "images", "render", "calibration", "analysis", "exchange"),
     *("api", "cli", "__main__"),
 )

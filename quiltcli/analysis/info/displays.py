@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,18 +30,31 @@ def display_info(path: Path) -> Info:
     lit = {"front": "front (walked around)", "back": "back (seen from inside)", "both": "both sides"}
     low, high = data["pitch_mm"]
     lines = [
-        ("mesh", data["mesh"]) if spec.panels is None else ("panels", f"{len(spec.panels):,}"),
+        *_sources(spec),
         ("facets", _facets_text(data)),
         ("lit side", lit[spec.viewing_side]),
         ("area", f"{number(data['area_m2'])} m²"),
         ("pixels", f"{data['pixels']:,}"),
-        ("pitch", spread(low, high, "mm")),
+        *([] if spec.projection else [("pitch", spread(low, high, "mm"))]),
         ("bounds", bounds_text(data["bounds"])),
         ("shared edges", f"{data['shared_edges']:,}"),
         ("geometry", facets.sha256),
     ]
     columns = ("facet", "name", "corners", "pixels", "area m²", "pitch mm", "normal", "")
     return Info("display", data, lines, columns, [_row(entry) for entry in table])
+
+
+def _sources(spec: DisplayFile) -> Iterator[tuple[str, str]]:
+    """What the display is made of."""
+    if spec.mesh is not None:
+        yield "mesh", str(spec.mesh)
+    if spec.panels is not None:
+        yield "panels", f"{len(spec.panels):,}"
+    if spec.surfaces is not None:
+        yield "surfaces", ", ".join(surface.kind for surface in spec.surfaces)
+    if spec.projection is not None:
+        projection = spec.projection
+        yield "projection", f"{projection.kind}, which follows the {projection.follows}"
 
 
 def _display_data(spec: DisplayFile, facets: Facets) -> dict[str, Any]:

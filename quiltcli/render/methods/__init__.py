@@ -42,7 +42,7 @@ def draw_frame(
     crew: Crew | None = None,
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet, by the job's method; see `frame.draw_frame`."""
-    other = OTHERS.get(stage.job.render.method)
+    other = cast_frame if stage.facets.charts else OTHERS.get(stage.job.render.method)
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
     return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, crew=crew)

@@ -1,0 +1,128 @@
+"""Curved displays and projections drawn, and held against rays and closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quiltcli.analysis.verify import verify_images
+from quiltcli.analysis.verify.images import draw_images
+from quiltcli.render.buffers import Buffers, new_buffers
+from quiltcli.render.methods import draw_frame
+from quiltcli.render.setup import Stage, set_stage
+from quiltcli.viewer.viewer import Viewer
+from tests.helpers.curved_jobs import PROJECTIONS, SURFACES, boxes, bumpy_ball, curved_job
+from tests.helpers.in_memory import icosphere
+from tests.helpers.verified_jobs import EVERY
+
+METHODS = ("homography", "raycast")
+
+
+def staged(job: object) -> tuple[Stage, Viewer]:
+    stage = set_stage(job)  # type: ignore[arg-type]
+    return stage, stage.views([1])[0].viewer
+
+
+def drawn(stage: Stage, viewer: Viewer) -> Buffers:
+    buffers = new_buffers(stage)
+    draw_frame(stage, viewer, buffers)
+    return buffers
+
+
+def page(stage: Stage, flat: np.ndarray) -> np.ndarray:
+    width, height = stage.layout.pages[0]
+    return flat[: width * height].reshape(height, width)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("method", METHODS)
+def test_surfaces_are_verified(name: str, method: str, tmp_path: Path) -> None:
+    vertices, faces = boxes(30, 0.5, 1.2)
+    display = f"surfaces:\n- {{{SURFACES[name]}, pixels: [96, 64]}}"
+    inside = "lit: inside" in SURFACES[name]
+    eye = (0.1, 0.3, 0.2) if inside else (1.2, 2.6, 3.1)
+    job = curved_job(tmp_path, display, (vertices, faces), eye, more=f"render: {{method: {method}}}\n")
+    stage, viewer = staged(job)
+    images = draw_images(stage, stage.views([1])[0], 1)
+    verdict = verify_images(stage, viewer, images, EVERY)
+    assert verdict.passed, verdict.faults
+    assert verdict.inside.counts["covered"] > 300
+    assert verdict.outside == 0
+
+
+@pytest.mark.parametrize("name", PROJECTIONS)
+@pytest.mark.parametrize("method", METHODS)
+def test_projections_are_verified_and_full(name: str, method: str, tmp_path: Path) -> None:
+    size = {"cross": (128, 96), "row": (192, 32)}.get(name, (128, 64))
+    display = f"projection: {{{PROJECTIONS[name]}, pixels: [{size[0]}, {size[1]}]}}"
+    more = f"render: {{method: {method}}}\n"
+    job = curved_job(tmp_path, display, bumpy_ball(splits=2), (0.2, 0.1, -0.3), (1, 0, 2), more)
+    stage, viewer = staged(job)
+    images = draw_images(stage, stage.views([1])[0], 1)
+    verdict = verify_images(stage, viewer, images, EVERY)
+    assert verdict.passed, verdict.faults
+    # The ball is closed: every pixel that has a direction sees it.
+    assert verdict.inside.counts["covered"] == verdict.inside.counts["pixels"] == (stage.owners > 0).sum()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_panorama_sees_a_wall_where_it_is(method: str, tmp_path: Path) -> None:
+    wall = ([(-50, -50, -3.0), (50, -50, -3.0), (50, 50, -3.0), (-50, 50, -3.0)], [(0, 1, 2, 3)])
+    more = f"render: {{method: {method}}}\n"
+    display = "projection: {kind: equirect, pixels: [128, 64]}"
+    stage, viewer = staged(curved_job(tmp_path, display, wall, (0.3, 0.1, 0), (0.3, 0.1, -1), more))
+    z = page(stage, drawn(stage, viewer)["Z"])
+    x, y = np.meshgrid(np.arange(128) + 0.5, np.arange(64) + 0.5)
+    a, b = 2 * np.pi * (x / 128 - 0.5), np.pi * (0.5 - y / 64)
+    ahead = np.cos(b) * np.cos(a)
+    expected = np.where(ahead > 0, 3 / np.where(ahead > 0, ahead, 1), np.inf)
+    near = expected < 40
+    assert np.abs(z[near] / expected[near] - 1).max() < 1e-6
+    assert np.isinf(z[ahead < 0]).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_sphere_is_lit_where_the_eye_is_above_its_pixels(method: str, tmp_path: Path) -> None:
+    display = "surfaces:\n- {kind: sphere, radius: 1, pixels: [128, 64]}"
+    ball = icosphere(3)
+    room = (ball[0] * 30, ball[1])
+    more = f"render: {{method: {method}}}\n"
+    stage, viewer = staged(curved_job(tmp_path, display, room, (0.4, 1.0, 3.0), more=more))
+    z = page(stage, drawn(stage, viewer)["Z"])[:64, :128]
+    x, y = np.meshgrid(np.arange(128) + 0.5, np.arange(64) + 0.5)
+    a, b = 2 * np.pi * (x / 128 - 0.5), np.pi * y / 64
+    normal = np.stack((np.sin(b) * np.sin(a), np.cos(b), np.sin(b) * np.cos(a)))
+    lit = np.tensordot(viewer.eye, normal, 1) - 1 > 1e-9
+    assert (np.isfinite(z) == lit).all()
+    share = (np.sin(b) * lit).sum() / np.sin(b).sum()
+    assert share == pytest.approx((1 - 1 / np.sqrt(viewer.eye @ viewer.eye)) / 2, abs=0.015)
+
+
+def test_a_mask_leaves_pixels_to_nobody(tmp_path: Path) -> None:
+    from tests.helpers.curved_jobs import write_map
+
+    mask = np.ones((3, 32, 64))
+    mask[:, :, 20:30] = 0
+    write_map(tmp_path / "mask.exr", mask)
+    display = "surfaces:\n- {kind: sphere, radius: 1, lit: inside, pixels: [64, 32], mask: mask.exr}"
+    stage, viewer = staged(curved_job(tmp_path, display, bumpy_ball(), (0.1, 0, 0)))
+    owners = page(stage, stage.owners)[:32, :64]
+    assert (owners[:, 20:30] == 0).all()
+    z = page(stage, drawn(stage, viewer)["Z"])[:32, :64]
+    assert (np.isfinite(z) == (owners == 1)).all()
+
+
+def test_a_projection_that_follows_the_view_turns_with_it(tmp_path: Path) -> None:
+    display = "projection: {kind: fisheye, fov_deg: 120, follows: view, pixels: [48, 48]}"
+    target = icosphere(2)
+    scene = (target[0] * 0.5 + np.array([4.0, 1.0, 2.0]), target[1])
+    stage, viewer = staged(curved_job(tmp_path, display, scene, (0, 0, 0), (4, 1, 2)))
+    z = page(stage, drawn(stage, viewer)["Z"])
+    rows, columns = np.nonzero(np.isfinite(z))
+    assert abs(rows.mean() - 23.5) < 0.5
+    assert abs(columns.mean() - 23.5) < 0.5
+    away = replace(viewer, look=-viewer.look)
+    assert not np.isfinite(drawn(stage, away)["Z"]).any()
