@@ -213,7 +213,7 @@ class BezierSurface(SurfaceBase):
     kind: Literal["bezier"]
     """Kind of surface."""
     points: Annotated[tuple[Points, ...], Listed, Field(min_length=2)]
-    """Rows of control points, each from left to right as seen from the front, in numbers of `units` (metres)."""
+    """Rows of control points, from left to right as seen from the front, numbers of `units` (metres)."""
     lit: Annotated[str, OneOf(SHEET)] = "front"
     """Lit side: front, from where rows run right and follow each other down, or back."""
 
@@ -238,7 +238,7 @@ class NurbsSurface(SurfaceBase):
     kind: Literal["nurbs"]
     """Kind of surface."""
     points: Annotated[tuple[Points, ...], Listed, Field(min_length=2)]
-    """Rows of control points, each from left to right as seen from the front, in numbers of `units` (metres)."""
+    """Rows of control points, from left to right as seen from the front, numbers of `units` (metres)."""
     weights: Annotated[tuple[Annotated[tuple[Positive, ...], Listed], ...], Listed] | None = None
     """Rows of weights, as many as points; all 1 when absent."""
     degree: Annotated[
