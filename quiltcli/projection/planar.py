@@ -11,6 +11,7 @@ axes: the picture on a facet does not depend on which way the viewer looks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from quiltcli.geometry import BoolArray, FloatArray, cross, dot
 from quiltcli.layout import Layout
 from quiltcli.projection.curved import ChartView, chart_views
 from quiltcli.viewer.viewer import Viewer
+
+if TYPE_CHECKING:
+    from quiltcli.projection.patches import Patched
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,7 @@ class QuiltRays:
         quilt_from_eye: (F, 3, 3) point minus eye → homogeneous page pixel (X, Y, W).
         views: of every facet what the eye sees of its chart, None where it is flat and the matrices hold;
             empty where all are.
+        patched: curved facets in flat patches, once they have been cut for drawing.
     """
 
     eye: FloatArray
@@ -40,6 +45,7 @@ class QuiltRays:
     eye_from_quilt: FloatArray
     quilt_from_eye: FloatArray
     views: tuple[ChartView | None, ...] = ()
+    patched: Patched | None = None
 
 
 def quilt_rays(

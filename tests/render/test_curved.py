@@ -13,6 +13,7 @@ from quiltcli.analysis.verify.images import draw_images
 from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.methods import draw_frame
 from quiltcli.render.setup import Stage, set_stage
+from quiltcli.render.workers import Pool, shared_buffers
 from quiltcli.viewer.viewer import Viewer
 from tests.helpers.curved_jobs import PROJECTIONS, SURFACES, boxes, bumpy_ball, curved_job
 from tests.helpers.in_memory import icosphere
@@ -126,3 +127,62 @@ def test_a_projection_that_follows_the_view_turns_with_it(tmp_path: Path) -> Non
     assert abs(columns.mean() - 23.5) < 0.5
     away = replace(viewer, look=-viewer.look)
     assert not np.isfinite(drawn(stage, away)["Z"]).any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_background_lies_where_pixels_are_lit_and_nowhere_else(method: str, tmp_path: Path) -> None:
+    display = "surfaces:\n- {kind: sphere, radius: 1, pixels: [128, 64]}"
+    target = icosphere(1)
+    scene = (target[0] * 0.3, target[1])
+    job = curved_job(tmp_path, display, scene, (0.4, 1.0, 3.0), more=f"render: {{method: {method}}}\n")
+    (tmp_path / "scene.yaml").write_text(
+        "quilt_scene: 1\nobjects:\n- {mesh: scene.obj}\nbackground: [0, 0, 1]\n"
+    )
+    job = job.model_copy(update={"scene": tmp_path / "scene.yaml"})
+    stage, viewer = staged(job)
+    buffers = drawn(stage, viewer)
+    blue, z = page(stage, buffers["B"]), page(stage, buffers["Z"])
+    x, y = np.meshgrid(np.arange(128) + 0.5, np.arange(64) + 0.5)
+    a, b = 2 * np.pi * (x / 128 - 0.5), np.pi * y / 64
+    normal = np.stack((np.sin(b) * np.sin(a), np.cos(b), np.sin(b) * np.cos(a)))
+    lit = np.tensordot(viewer.eye, normal, 1) - 1 > 1e-9
+    assert np.isfinite(z).any()
+    bare = ~np.isfinite(z[:64, :128])
+    assert (blue[:64, :128][lit & bare] == 1).all()
+    assert (blue[:64, :128][~lit] == 0).all()
+
+
+def test_frames_that_follow_each_other_leave_nothing_behind(tmp_path: Path) -> None:
+    display = "surfaces:\n- {kind: sphere, radius: 1, pixels: [128, 64]}"
+    job = curved_job(tmp_path, display, boxes(20, 0.5, 0.7), (0.4, 1.0, 3.0))
+    stage, viewer = staged(job)
+    other = replace(viewer, eye=np.array([-2.5, 0.3, -1.0]), look=np.array([0.93, 0.0, 0.37]))
+    buffers, dirty = new_buffers(stage), np.zeros(stage.blocks.used.size, dtype=bool)
+    draw_frame(stage, viewer, buffers, dirty=dirty)
+    draw_frame(stage, other, buffers, dirty=dirty)
+    fresh = drawn(stage, other)
+    for name, values in fresh.items():
+        assert (buffers[name] == values).all(), name
+
+
+def test_samples_average_to_rays_at_the_same_places(tmp_path: Path) -> None:
+    display = "projection: {kind: equirect, pixels: [64, 32]}"
+    job = curved_job(
+        tmp_path, display, bumpy_ball(splits=1), (0.2, 0.1, -0.3), more="render: {samples: 16}\n"
+    )
+    stage, viewer = staged(job)
+    alpha = page(stage, drawn(stage, viewer)["A"])
+    assert (alpha == 1).all()
+
+
+def test_workers_and_threads_give_the_same_bytes(tmp_path: Path) -> None:
+    display = "surfaces:\n- {kind: torus, radius: 1, tube: 0.35, pixels: [160, 128]}"
+    stage, viewer = staged(curved_job(tmp_path, display, boxes(40, 0.4, 1.5), (1.2, 2.0, 2.4)))
+    alone = drawn(stage, viewer)
+    threads, processes = new_buffers(stage), shared_buffers(stage)
+    draw_frame(stage, viewer, threads, 2)
+    with Pool(stage, [processes], 2) as pool:
+        draw_frame(stage, viewer, processes, crew=pool)
+    for name, values in alone.items():
+        assert (threads[name] == values).all(), name
+        assert (processes[name] == values).all(), name

@@ -14,6 +14,7 @@ import numpy as np
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import Crew
+from quiltcli.render.frame import TooNearError
 from quiltcli.render.frame import draw_frame as rasterize_frame
 from quiltcli.render.methods.raycast import cast_frame
 from quiltcli.render.methods.twopass import draw_twice
@@ -42,10 +43,17 @@ def draw_frame(
     crew: Crew | None = None,
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet, by the job's method; see `frame.draw_frame`."""
-    other = cast_frame if stage.facets.charts else OTHERS.get(stage.job.render.method)
+    other = OTHERS.get(stage.job.render.method)
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
-    return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, crew=crew)
+    try:
+        return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, crew=crew)
+    except TooNearError:
+        if stage.job.render.samples > 1:
+            raise
+        if dirty is not None:
+            dirty[:] = True
+        return cast_frame(stage, viewer, buffers, threads, only)
 
 
 def draw_view(

@@ -53,7 +53,7 @@ def cast_frame(
     target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     clear(stage, buffers, only)
-    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers)
+    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers, rays)
 
     def draw(address: IntArray) -> int:
         address = address[lit_pixels(address, stage.layout, stage.owners, rays)]
