@@ -16,7 +16,7 @@ from quiltcli.charts.projections import KINDS as PROJECTIONS
 from quiltcli.charts.shapes import Placed, Shape, slopes
 from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.noted import noted_digest
-from quiltcli.formats.pictures import read_numbers
+from quiltcli.formats.numbers import read_numbers
 from quiltcli.geometry import BoolArray, FloatArray, applied, rotation_deg
 from quiltcli.geometry.formulas import parse
 from quiltcli.job.display import DisplayFile

@@ -13,7 +13,7 @@ from quiltcli.charts.shapes import Shape, Smooth, stacked
 from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import read_mesh
 from quiltcli.formats.mesh.polygons import plane_coordinates, triangulate
-from quiltcli.formats.pictures import read_numbers
+from quiltcli.formats.numbers import read_numbers
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, cross, dot, normalized
 from quiltcli.job.lengths import UNITS
 

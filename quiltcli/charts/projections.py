@@ -11,7 +11,7 @@ from quiltcli.charts.grids import Grid, grid_of, grid_shape
 from quiltcli.charts.shapes import Shape, Smooth, over, stacked, turned
 from quiltcli.charts.warps import mesh_directions, offset_directions, st_directions
 from quiltcli.errors import DisplayError, Problem
-from quiltcli.formats.pictures import read_numbers
+from quiltcli.formats.numbers import read_numbers
 from quiltcli.geometry import FloatArray, rotation_deg
 from quiltcli.job import projections as models
 

@@ -11,7 +11,7 @@ import numpy as np
 from quiltcli.charts.grids import drawn_pixels
 from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.inputs import read_input
-from quiltcli.formats.pictures import read_numbers
+from quiltcli.formats.numbers import read_numbers
 from quiltcli.geometry import FloatArray
 
 
