@@ -131,7 +131,7 @@ CURVED = {
         "  - [[-1.5, 0.6, 0.5], [-0.6, 0.4, -0.6], [0.6, 0.8, 0.6], [1.5, 0.6, -0.2]]\n",
     ),
     "panorama160": (
-        "a panorama of 160 flat strips around the eye, as Lorenz and Döllner cut it; without pieces it is round",
+        "a panorama of 160 flat strips around the eye (Lorenz and Döllner); without pieces it is round",
         "projection: {kind: cylinder, pieces: 160, pixels: [1600, 1200]}\n",
     ),
 }
