@@ -19,6 +19,7 @@ COMMANDS = (
     "contact",
     "diff",
     "export",
+    "facet",
     "import",
     "info",
     "new",
