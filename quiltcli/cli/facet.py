@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,13 @@ from quiltcli.cli.printing import print_files
 
 
 def _pixels(context: click.Context, option: click.Parameter, value: str) -> float:
-    match = re.fullmatch(r"\s*(\d{1,6}(?:\.\d{1,9})?)\s*(?:px)?\s*", value)
-    if match is None or not float(match[1]) > 0:
+    try:
+        pixels = float(value.strip().removesuffix("px"))
+    except ValueError:
+        pixels = 0.0
+    if not 1e-6 <= pixels <= 1e6:
         raise click.BadParameter(f"expected pixels such as 0.25px, got {value!r}")
-    return float(match[1])
+    return pixels
 
 
 @click.command()
