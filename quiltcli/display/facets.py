@@ -10,7 +10,7 @@ import numpy as np
 
 from quiltcli.charts.chart import EDGE_ON, Chart
 from quiltcli.display.edges import SharedEdges, find_shared_edges
-from quiltcli.errors import Problem
+from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import polygons
 from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import (
@@ -24,6 +24,8 @@ from quiltcli.geometry import (
     segments,
 )
 from quiltcli.job.places import PlaceOnPage
+
+_PLACES = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +154,34 @@ class Facets:
         for chart in self.charts:
             digest.update(b"-" if chart is None else chart.record.encode())
         return digest.hexdigest()
+
+
+def demand_flat(facets: Facets, what: str) -> None:
+    """Raise a DisplayError where a display has curved facets, for something that is for flat ones."""
+    if facets.curved.any():
+        words = f"{what} is for flat facets, and this display has curved ones"
+        raise DisplayError(Problem(f"{words} (quilt facet cuts a surface into flat ones)", facets.path))
+
+
+def display_points(facets: Facets) -> FloatArray:
+    """Points (N, 3) all over a display: corners of flat facets, places on curved ones, world metres.
+
+    Projections, which stand nowhere, count by the rectangles that stand for them.
+    """
+    if not facets.charts:
+        return facets.corners
+    row, _ = segments(facets.corner_start)
+    standing = np.array([chart is not None and chart.stands for chart in facets.charts])
+    found = [facets.corners[~standing[row]]]
+    found += [chart_points(chart).T for chart in facets.charts if chart is not None and chart.stands]
+    return np.concatenate(found)
+
+
+def chart_points(chart: Chart) -> FloatArray:
+    """Points (3, N), or directions, at places all over a chart that there are."""
+    x, y = (np.clip(np.linspace(0, side, _PLACES), 0.5, side - 0.5) for side in chart.size)
+    points = np.broadcast_to(chart.points(x, y[:, None]), (3, _PLACES, _PLACES)).reshape(3, -1)
+    return points[:, np.isfinite(points.sum(axis=0))]
 
 
 def lit_facets(facets: Facets, eye: FloatArray) -> BoolArray:
