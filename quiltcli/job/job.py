@@ -31,7 +31,7 @@ from quiltcli.job.model import (
 from quiltcli.job.names import NamesSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
-METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
+METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap")
 DEPTH_BITS = ("16", "24", "32f")
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
 COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
@@ -117,12 +117,15 @@ class RenderSpec(Model):
     planar where depth is planar and every lit pixel of every frame lies ahead of the eye (auto)."""
     backface_culling: bool = False
     """Drop triangles that face away from the viewer."""
+    faces: Annotated[int, Field(ge=1, le=16384)] | None = None
+    """Width and height of the faces that method: cubemap looks pixels up in, 2048 when absent, pixels."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        return "zv" in channels or self.depth_bits is not None or self.method not in ("homography", "raycast")
+        by_distance = ("homography", "raycast", "cubemap")
+        return "zv" in channels or self.depth_bits is not None or self.method not in by_distance
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Rays have neither a depth buffer nor several samples; depth buffers lie between planes."""
@@ -131,6 +134,10 @@ class RenderSpec(Model):
             yield ("clip",), f"{what} needs a near and a far plane (expected planar or auto), got distance"
         if self.method == "raycast" and self.depth_bits is not None:
             yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
+        if self.method != "cubemap" and self.faces is not None:
+            yield ("faces",), f"belongs to method: cubemap, got method: {self.method}"
+        if self.method == "cubemap" and self.depth_bits is not None:
+            yield ("depth_bits",), "a cube map has exact depth (expected no such key beside method: cubemap)"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
 

@@ -68,9 +68,9 @@ def method_problems(job: JobFile, facets: Facets) -> list[Problem]:
     how, source = job.render, job.render.source
     if not facets.charts:
         return []
-    if how.method not in ("homography", "raycast"):
+    if how.method not in ("homography", "raycast", "cubemap"):
         words = f"{how.method} projects onto flat facets, and the display has curved ones"
-        return [source.problem("method", f"{words} (expected homography or raycast)")]
+        return [source.problem("method", f"{words} (expected homography, raycast or cubemap)")]
     if how.depth_bits is not None:
         words = "a depth buffer of so many bits belongs to flat facets, and the display has curved ones"
         return [source.problem("depth_bits", f"{words} (expected no such key)")]

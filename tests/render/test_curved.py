@@ -186,3 +186,26 @@ def test_workers_and_threads_give_the_same_bytes(tmp_path: Path) -> None:
     for name, values in alone.items():
         assert (threads[name] == values).all(), name
         assert (processes[name] == values).all(), name
+
+
+def test_a_cube_map_is_what_it_shows_between_its_pixels(tmp_path: Path) -> None:
+    display = "projection: {kind: equirect, pixels: [128, 64]}"
+    more = "output: {channels: [rgba, Z]}\n"
+    pictures = []
+    for how in ("homography", "cubemap, faces: 512"):
+        job = curved_job(
+            tmp_path,
+            display,
+            bumpy_ball(splits=3, bumps=0.02),
+            (0.1, 0, 0),
+            (1, 0, 0),
+            f"render: {{method: {how}}}\n{more}",
+        )
+        stage, viewer = staged(job)
+        buffers = drawn(stage, viewer)
+        pictures.append([page(stage, buffers[name]).astype(np.float64) for name in ("R", "Z")])
+    (red, z), (mapped_red, mapped_z) = pictures
+    assert np.isfinite(mapped_z).all()
+    assert np.abs(mapped_z / z - 1).max() < 2e-3
+    assert np.abs(mapped_red - red).max() < 0.05
+    assert (mapped_red != red).any()

@@ -16,6 +16,7 @@ from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import Crew
 from quiltcli.render.frame import TooNearError
 from quiltcli.render.frame import draw_frame as rasterize_frame
+from quiltcli.render.methods.cubemap import draw_cubemap
 from quiltcli.render.methods.raycast import cast_frame
 from quiltcli.render.methods.twopass import draw_twice
 from quiltcli.render.report import FrameRecord, together
@@ -28,6 +29,7 @@ __all__ = ["OTHERS", "draw_frame", "draw_view"]
 OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], FrameRecord]] = {
     "twopass": draw_twice,
     "raycast": cast_frame,
+    "cubemap": draw_cubemap,
 }
 """Methods that do not rasterize the quilt."""
 
