@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,21 @@ class Chart:
     def stands(self) -> bool:
         """Whether it is a surface in the world, not a projection around the eye."""
         return not self.follows
+
+    def scaled(self, size: tuple[int, int]) -> Chart:
+        """The same surface or projection with another number of pixels."""
+        mask = self.mask
+        if mask is not None:
+            y, x = (
+                np.minimum((np.arange(new) + 0.5) * old // new, old - 1).astype(int)
+                for new, old in zip(size[::-1], mask.shape, strict=True)
+            )
+            mask = mask[np.ix_(y, x)]
+        ratio = size[0] / self.size[0], size[1] / self.size[1]
+        columns, rows = (
+            tuple(round(cut * r) for cut in cuts) for cuts, r in zip(self.cuts, ratio, strict=True)
+        )
+        return replace(self, size=size, mask=mask, cuts=(columns, rows))
 
     def points(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Points or directions (3, ...) of continuous facet pixels that broadcast.

@@ -20,6 +20,8 @@ COMMANDS = (
     "diff",
     "export",
     "facet",
+    "farm",
+    "film",
     "import",
     "info",
     "new",

@@ -15,6 +15,7 @@ from quiltcli.display.facets import (
     lit_facets,
     pitch_mm,
     pitch_of,
+    scaled,
     shared_edges,
     triangulate,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "load_display",
     "pitch_mm",
     "pitch_of",
+    "scaled",
     "shared_edges",
     "triangulate",
 ]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -182,6 +183,24 @@ def chart_points(chart: Chart) -> FloatArray:
     x, y = (np.clip(np.linspace(0, side, _PLACES), 0.5, side - 0.5) for side in chart.size)
     points = np.broadcast_to(chart.points(x, y[:, None]), (3, _PLACES, _PLACES)).reshape(3, -1)
     return points[:, np.isfinite(points.sum(axis=0))]
+
+
+def scaled(facets: Facets, scale: Fraction) -> Facets:
+    """The same facets with fewer pixels: rasters grow to whole pixels at the right and below.
+
+    Places on a canvas, which are for whole images, are dropped.
+    """
+    top, bottom = scale.numerator, scale.denominator
+    size = -(-facets.size.astype(np.int64) * top // bottom)
+    size = np.maximum(size, 1)
+    du, dv = facets.du * (bottom / top), facets.dv * (bottom / top)
+    if facets.charts:
+        # A surface has all of its raster: its pixels grow, and what stands for it as they do.
+        ratio = np.where(facets.curved[:, None], facets.size / size, bottom / top)
+        du, dv = facets.du * ratio[:, :1], facets.dv * ratio[:, 1:]
+    pairs = zip(facets.charts, size.tolist(), strict=False)
+    charts = tuple(None if chart is None else chart.scaled((wide, high)) for chart, (wide, high) in pairs)
+    return replace(facets, size=size.astype(np.int32), du=du, dv=dv, places=None, charts=charts)
 
 
 def lit_facets(facets: Facets, eye: FloatArray) -> BoolArray:

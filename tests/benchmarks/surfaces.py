@@ -73,7 +73,8 @@ def demo_pictures() -> Iterator[Path]:
             job = Path(folder) / "job.yaml"
             job.write_text(
                 f"quilt_job: 1\ndisplay: {ROOT}/display_models/{name}.yaml\n"
-                f"scene: {ROOT}/scenes/{scene}.yaml\nframes: 1\nviewer:\n  near: 0.02\n  far: 2000\n  path: {{keyframes: [{{frame: 1,"
+                f"scene: {ROOT}/scenes/{scene}.yaml\nframes: 1\nviewer:\n  near: 0.02\n"
+                f"  far: 2000\n  path: {{keyframes: [{{frame: 1,"
                 f" position: {list(eye)}, look_at: {list(at)}}}]}}\n"
             )
             options = PictureOptions(

@@ -209,3 +209,14 @@ def test_a_cube_map_is_what_it_shows_between_its_pixels(tmp_path: Path) -> None:
     assert np.abs(mapped_z / z - 1).max() < 2e-3
     assert np.abs(mapped_red - red).max() < 0.05
     assert (mapped_red != red).any()
+
+
+@pytest.mark.parametrize("name", ["dome_master", "cross"])
+def test_a_proxy_has_fewer_pixels_of_the_same_picture(name: str, tmp_path: Path) -> None:
+    size = (128, 96) if name == "cross" else (128, 128)
+    display = f"projection: {{{PROJECTIONS[name]}, pixels: [{size[0]}, {size[1]}]}}"
+    job = curved_job(tmp_path, display, bumpy_ball(splits=2), (0.2, 0.1, -0.3), more="render: {scale: 0.5}\n")
+    stage, viewer = staged(job)
+    assert stage.facets.size.tolist() == [[size[0] // 2, size[1] // 2]]
+    z = drawn(stage, viewer)["Z"]
+    assert (np.isfinite(z) == (stage.owners > 0)).all()
