@@ -9,7 +9,7 @@ SEEN := out/demo/pictures
 DOCS := docs/pictures
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo pictures test test-long fuzz lint types format bench bench-docs packing-table golden schema docs dist clean
+.PHONY: help env demo pictures test test-long fuzz lint types format bench bench-docs packing-table surfaces golden schema docs dist clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -95,6 +95,10 @@ bench-docs: env ## the same, and put the tables and pictures into docs/performan
 
 packing-table: env ## pack every display by every method and write the tables of docs/packing.md
 	$(PY) -m tests.benchmarks.packing --write docs/packing.md
+
+surfaces: env ## measure curved displays, and put tables and pictures into docs/surfaces.md
+	$(PY) -m tests.benchmarks.surfaces --docs
+	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
 	$(PY) -m pytest tests/system/test_golden.py --update-golden

@@ -43,7 +43,7 @@ from quiltcli.job.model import attach
 from quiltcli.layout import Layout, align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.lightfield import load_field
-from quiltcli.render.needs import demand_memory
+from quiltcli.render.needs import demand_memory, method_problems
 from quiltcli.render.notices import job_warnings
 from quiltcli.render.ring.setup import notices as ring_notices
 from quiltcli.render.ring.setup import set_ring_stage
@@ -204,7 +204,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
     if facets is not None:
-        findings.problems += facet_problems(job, facets.count)
+        findings.problems += facet_problems(job, facets.count) + method_problems(job, facets)
     before = len(findings.problems)
     scene, source = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
     if facets is None or found:

@@ -79,7 +79,7 @@ def view_parallax(facets: Facets, scene: Scene, left: Viewer, right: Viewer) -> 
     step = -(-len(scene.vertices) // _MOST_POINTS)
     points = scene.vertices[::step]
     found = Parallax()
-    lit = their_lit_facets(facets, left) & their_lit_facets(facets, right)
+    lit = their_lit_facets(facets, left) & their_lit_facets(facets, right) & ~facets.curved
     across = right.eye - left.eye
     for facet in np.flatnonzero(lit).tolist():
         world, pixels, inside = facet_parallax(facets, facet, left.eye, right.eye, points)

@@ -21,6 +21,7 @@ COMMANDS = (
     "contact",
     "diff",
     "export",
+    "facet",
     "farm",
     "film",
     "import",

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from quiltcli.display.check import called, check_polygons
+from quiltcli.display.curved import joined, projection_facets, surface_facets
 from quiltcli.display.facets import Facets, places_of
 from quiltcli.display.notices import likely_unit
 from quiltcli.display.panels import panel_facets
@@ -29,9 +30,12 @@ def load_display(spec: DisplayFile) -> Facets:
         MeshError: the mesh cannot be read.
         DisplayError: the mesh or the display file makes no facets; every problem found is in it.
     """
-    if spec.mesh is None:
-        return panel_facets(spec)
-    return build_facets(read_mesh(spec.mesh), spec)
+    if spec.projection is not None:
+        return projection_facets(spec)
+    if spec.mesh is None and spec.panels is None:
+        return surface_facets(spec)
+    flat = panel_facets(spec) if spec.mesh is None else build_facets(read_mesh(spec.mesh), spec)
+    return flat if spec.surfaces is None else joined(flat, surface_facets(spec))
 
 
 def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:

@@ -71,6 +71,12 @@ def write_whole(path: Path, data: bytes) -> None:
         temporary.write_bytes(data)
 
 
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file of bytes, whole or not at all (OutputError if that fails)."""
+    with whole_file(path) as temporary:
+        temporary.write_bytes(data)
+
+
 def link_whole(source: Path, path: Path) -> None:
     """Make `path` the same file as `source`, by a hard link; a copy where there can be none (OutputError)."""
     temporary = path_beside(path)

@@ -72,6 +72,11 @@ def facet_attributes(facet_id: int, facet_from_world: FloatArray) -> dict[str, o
     return {"quilt:facet": int(facet_id), "quilt:facet_from_world": numbers}
 
 
+def surface_attributes(facet_id: int, record: str) -> dict[str, object]:
+    """What the image of a curved facet adds: its 1-based id and its surface or projection, as JSON."""
+    return {"quilt:facet": int(facet_id), "quilt:surface": record}
+
+
 def is_complete(path: Path, job_sha: str, frame: int) -> bool:
     """Whether `path` is an image of this `frame` by the job with that hash, and no bit of it wrong."""
     if not is_sealed(path):

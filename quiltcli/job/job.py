@@ -45,7 +45,7 @@ from quiltcli.job.names import NamesSpec
 from quiltcli.job.ring import RingSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
-METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
+METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap")
 RING_METHODS = ("exact", "raycast", "vertex")
 DEPTH_BITS = ("16", "24", "32f")
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
@@ -149,6 +149,8 @@ class RenderSpec(Model):
     planar where depth is planar and every lit pixel of every frame lies ahead of the eye (auto)."""
     backface_culling: bool = False
     """Drop triangles that face away from the viewer."""
+    faces: Annotated[int, Field(ge=1, le=16384)] | None = None
+    """Width and height of the faces that method: cubemap looks pixels up in, 2048 when absent, pixels."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
 
@@ -162,11 +164,8 @@ class RenderSpec(Model):
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        return (
-            "zv" in channels
-            or self.depth_bits is not None
-            or self.method not in ("homography", *RING_METHODS)
-        )
+        by_distance = ("homography", "raycast", "cubemap", *RING_METHODS)
+        return "zv" in channels or self.depth_bits is not None or self.method not in by_distance
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Rays have neither a depth buffer nor several samples; depth buffers lie between planes."""
@@ -177,6 +176,10 @@ class RenderSpec(Model):
             yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
         if self.tessellate is not None and self.method != "vertex":
             yield ("tessellate",), f"belongs to method: vertex, got {self.method}"
+        if self.method != "cubemap" and self.faces is not None:
+            yield ("faces",), f"belongs to method: cubemap, got method: {self.method}"
+        if self.method == "cubemap" and self.depth_bits is not None:
+            yield ("depth_bits",), "a cube map has exact depth (expected no such key beside method: cubemap)"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
 

@@ -16,7 +16,7 @@ from quiltcli.formats.yaml.syntax import read_text
 from quiltcli.job.calibration import CalibrationFile
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.job import RING_METHODS, JobFile
-from quiltcli.job.layout import LayoutFile, PackSpec
+from quiltcli.job.layout import LayoutFile, PackSpec, UvLayoutSpec
 from quiltcli.job.lightfield import LightfieldFile
 from quiltcli.job.messages import KINDS, NO_KIND, problems_of, version_problem
 from quiltcli.job.mirror import KIND, MirrorDisplayFile, is_mirror
@@ -152,7 +152,13 @@ def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
         job = job.model_copy(update={"render": render})
         attach(job, found.source)
     if job.layout is None and isinstance(display, DisplayFile):
-        job = job.model_copy(update={"layout": display.layout or PackSpec()})
+        job = job.model_copy(update={"layout": _default_layout(display)})
+        attach(job, found.source)
+    projection = display.projection if isinstance(display, DisplayFile) else None
+    if projection is not None and "depth" not in job.render.model_fields_set:
+        # All around the eye, a plane's depth would draw nothing behind it.
+        render = job.render.model_copy(update={"depth": "radial"})
+        job = job.model_copy(update={"render": render})
         attach(job, found.source)
     return job
 
@@ -166,6 +172,13 @@ def _fits(job: JobFile, display: DisplayFile | MirrorDisplayFile) -> None:
     if isinstance(display, DisplayFile) and job.ring is not None:
         words = f"belongs to {KIND}, but {job.display} is a display of facets (expected viewer)"
         raise JobError(job.source.problem(("ring",), words))
+
+
+def _default_layout(display: DisplayFile) -> PackSpec | UvLayoutSpec:
+    """What an absent layout means: the display's own, a projection's picture alone, or packing."""
+    if display.projection is not None and display.projection.place is None:
+        return PackSpec(size=display.projection.pixels, padding=0)
+    return display.layout or PackSpec()
 
 
 def pack_spec(**wishes: Any) -> PackSpec:

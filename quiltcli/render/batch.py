@@ -43,7 +43,7 @@ def draw_batch(
     """
     frame = ordered(stage, frame)
     block = np.arange(*batch)
-    lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers)
+    lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers, frame.rays)
     channels = stage.job.output.channels
     light = averaged(channels) if stage.job.render.samples > 1 else ()
     if light:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from quiltcli.display import lit_facets
+from quiltcli.errors import ViewerError
 from quiltcli.geometry import BoolArray
-from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.buffers import Buffers, empty_before, note_drawn, written_blocks
 from quiltcli.render.crew import Crew, Threads
 from quiltcli.render.notices import frame_warnings
@@ -19,6 +19,10 @@ from quiltcli.render.report import Clock, FrameRecord
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame, batches
+
+
+class TooNearError(ViewerError):
+    """The eye is so near to a curved facet that no plane lies across all rays of a patch."""
 
 
 def draw_frame(
@@ -52,9 +56,11 @@ def draw_frame(
         lit &= only
     with clock.stage("bin"):
         crew.begin(stage)
-        rays = quilt_rays(stage.layout, lit, viewer.eye)
+        rays = stage.rays(lit, viewer)
+        if rays.patched is not None and rays.patched.near:
+            raise TooNearError(f"frame {viewer.frame}: the eye is too near to a curved facet")
         binned = crew.bin(viewer, rays)
-    frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs)
+    frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs, patches=stage.patches)
     with clock.stage("clear"):
         stale = empty_before(stage, frame, buffers, only, dirty, crew.clear)
     with clock.stage("rasterize and shade"):

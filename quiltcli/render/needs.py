@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from quiltcli.channels import exr_channels
-from quiltcli.errors import JobError
+from quiltcli.display import Facets
+from quiltcli.errors import JobError, Problem
 from quiltcli.formats.capacity import bytes_text, free_disk, free_memory
 from quiltcli.job import JobFile
 from quiltcli.job.names import Slot, read_template
@@ -93,3 +94,17 @@ def disk_warnings(job: JobFile, layout: Layout, frames: Sequence[int] | None = N
             f"the images of {count:,} view{'s' * (count > 1)} hold {bytes_text(needed)} before compression,"
             f" and {bytes_text(free)} are free in {job.output.directory}"
         )
+
+
+def method_problems(job: JobFile, facets: Facets) -> list[Problem]:
+    """What a job asks for that curved facets do not have: methods that project onto planes."""
+    how, source = job.render, job.render.source
+    if not facets.charts:
+        return []
+    if how.method not in ("homography", "raycast", "cubemap"):
+        words = f"{how.method} projects onto flat facets, and the display has curved ones"
+        return [source.problem("method", f"{words} (expected homography, raycast or cubemap)")]
+    if how.depth_bits is not None:
+        words = "a depth buffer of so many bits belongs to flat facets, and the display has curved ones"
+        return [source.problem("depth_bits", f"{words} (expected no such key)")]
+    return []

@@ -19,7 +19,7 @@ from quiltcli.formats.exr.image import Channel, Image, read_exr, read_header, wr
 from quiltcli.formats.whole import link_whole, make_folder, remove_file, sync_folder, write_text
 from quiltcli.geometry import BoolArray, IntArray, facet_from_world
 from quiltcli.images.facets import facet_image, page_of
-from quiltcli.images.metadata import facet_attributes, page_attributes, viewer_attributes
+from quiltcli.images.metadata import facet_attributes, page_attributes, surface_attributes, viewer_attributes
 from quiltcli.images.names import layout_path
 from quiltcli.images.window import cropped, frame_size, tight_window, whole_frame
 from quiltcli.job import PackSpec, dump_job
@@ -166,7 +166,10 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
     apart = ~lit[out.rows] & (how.unlit != "write")
     for row in out.rows[~apart].tolist():
         facet = int(layout.facet[row])
+        chart = stage.facets.charts[row] if stage.facets.charts else None
         where = facet_attributes(facet, maps[row]) | out.besides
+        if chart is not None:
+            where = surface_attributes(facet, chart.record) | out.besides
         own = [viewer_attributes(one.view, facet, *told) | where for one in drawn]
         path = facet_file(stage, out, row, view)
         yield _write_facet, stage, path, row, drawn, own

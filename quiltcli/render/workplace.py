@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from quiltcli.ending import SIGNALS
 from quiltcli.geometry import BoolArray
-from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.arena import (
     Arena,
     arena_of,
@@ -80,7 +79,7 @@ class Workplace:
 
     def begin(self, task: Task) -> None:
         """Turn to another frame."""
-        rays = quilt_rays(self._stage.layout, task.lit, task.viewer.eye)
+        rays = self._stage.rays(task.lit, task.viewer)
         self._plan, self._frame = plan_of(self._stage, task.viewer, rays), None
 
     def move(self, moved: Moved, connection: Connection) -> None:
@@ -123,7 +122,7 @@ class Workplace:
             seen, plan, stage = self._arena.seen, self.plan, self._stage
             sight = sight_of(stage.scene, seen, culling=plan.culling)
             pairs = self._arena.frame_pairs()
-            self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs)
+            self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs, patches=stage.patches)
         return draw_batch(self._stage, self._frame, batch, self._buffers[index], stale)
 
     @property

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from quiltcli.display import load_display
+from quiltcli.display import display_points, load_display
 from quiltcli.errors import Problem, QuiltError, ViewerError, raise_all
 from quiltcli.geometry import FloatArray
 from quiltcli.job import JobFile, ViewerSpec, load_display_file
@@ -111,7 +111,7 @@ def _middle_of(job: JobFile) -> FloatArray:
 @lru_cache(maxsize=8)
 def display_middle(path: Path, changed: int) -> FloatArray:
     """The middle (3,) of the box around a display, world metres."""
-    corners = load_display(load_display_file(path)).corners
+    corners = display_points(load_display(load_display_file(path)))
     return np.asarray((corners.min(axis=0) + corners.max(axis=0)) / 2)
 
 

@@ -10,14 +10,16 @@ where those are. Nothing here knows of colour.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
+from quiltcli.projection.patches import Patches
 from quiltcli.projection.planar import QuiltRays
 from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.resolve.displaced import read_displaced
 from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.pixels import MixedTiles
 from quiltcli.visibility.resolve.reader import Reader
@@ -26,6 +28,7 @@ from quiltcli.visibility.resolve.visibility import SQUARE, Region, read_canvas
 from quiltcli.visibility.resolve.whole import WholeTiles
 from quiltcli.visibility.scan.depth import DepthRange, triangles_in_range
 from quiltcli.visibility.scan.depth_buffers import DepthOrder
+from quiltcli.visibility.scan.displaced import draw_displaced
 from quiltcli.visibility.scan.keys import serial_bits
 from quiltcli.visibility.scan.large import covering_keys, draw_large
 from quiltcli.visibility.scan.order import BatchOrder
@@ -41,7 +44,7 @@ from quiltcli.visibility.setup.blocks import (
     new_canvas,
     ray_matrices,
 )
-from quiltcli.visibility.setup.planes import PlaneTable
+from quiltcli.visibility.setup.planes import DISPLACED, LATTICE, PlaneTable
 from quiltcli.visibility.setup.prewarp import (
     BlockPairs,
     Sight,
@@ -51,6 +54,7 @@ from quiltcli.visibility.setup.prewarp import (
     vertex_blocks,
     warp,
 )
+from quiltcli.visibility.setup.samples import Samples, samples_of
 
 __all__ = [
     "BlockPairs",
@@ -86,6 +90,7 @@ class Frame:
         blocks: the blocks of the layout.
         pairs: triangles by block.
         order: the depth buffer that decides what is nearest; None for exact depth.
+        patches: of curved facets, whose blocks come last; None where there are none.
     """
 
     viewer: Viewer
@@ -94,6 +99,7 @@ class Frame:
     blocks: Blocks
     pairs: BlockPairs
     order: DepthOrder | None = None
+    patches: Patches | None = None
 
 
 def batches(frame: Frame, wanted: BoolArray | None = None, workers: int = 1) -> list[tuple[int, int]]:
@@ -118,6 +124,7 @@ class Drawing:
         table: planes of the pairs.
         limits: how depth is measured.
         bits: bits of the serial in a key.
+        samples: where the rays of patches go through; None of flat facets.
     """
 
     blocks: Blocks
@@ -125,6 +132,7 @@ class Drawing:
     table: PlaneTable
     limits: DepthRange
     bits: int
+    samples: Samples | None = None
 
     def regions(
         self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None, largest: int = SQUARE
@@ -137,6 +145,8 @@ class Drawing:
             largest: microtiles from side to side of the largest regions, SQUARE or 1.
         """
         reader = Reader(self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted)
+        if self.samples is not None:
+            return read_displaced(reader, self.samples)
         return read_canvas(reader, largest)
 
     def hits(self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None) -> Iterator[Hits]:
@@ -190,6 +200,8 @@ def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None)
     block = batch[0] + np.flatnonzero(counts[batch[0] : batch[1]])
     bits = serial_bits(int(counts[block].sum()))
     canvas = new_canvas(block, frame.blocks)
+    if block.size and block[0] >= frame.blocks.flat:
+        return _draw_patches(frame, canvas, bits, sample)
     rays = ray_matrices(frame.rays.eye_from_quilt, frame.blocks, block, sample)
     viewer = frame.viewer
     limits = DepthRange(
@@ -211,3 +223,29 @@ def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None)
     draw_small(pairs, rows, table, canvas, limits, bits, by, covering, culled=culled)
     draw_large(large, spans, covering, canvas, limits, bits, by)
     return Drawing(frame.blocks, canvas, table, limits, bits)
+
+
+def _draw_patches(frame: Frame, canvas: Canvas, bits: int, sample: FloatArray | None) -> Drawing:
+    """Draw the triangles of a batch of patches; for the arguments see `draw`."""
+    rays, patches, viewer, block = frame.rays, frame.patches, frame.viewer, canvas.block
+    assert patches is not None
+    assert rays.patched is not None
+    which = block - frame.blocks.flat
+    beside = np.zeros((2, which.size)) if sample is None else sample[frame.blocks.facet[block]].T
+    samples = samples_of(rays, patches, canvas, which, (beside[0], beside[1]))
+    canvas = replace(canvas, owned=np.packbits(samples.lit, axis=1))
+    # Rays and planes of the patches, counted from the samples of their first pixels.
+    matrix = rays.patched.eye_from_patch[which].copy()
+    matrix[:, :, 2] += beside[0, :, None] * matrix[:, :, 0] + beside[1, :, None] * matrix[:, :, 1]
+    limits = DepthRange(
+        viewer.near, viewer.far, viewer.by_distance, viewer.depth == "radial", viewer.look, matrix
+    )
+    inverse = rays.patched.patch_from_eye[which].copy()
+    inverse[:, 0] -= (beside[0] + LATTICE[0])[:, None] * inverse[:, 2]
+    inverse[:, 1] -= (beside[1] + LATTICE[1])[:, None] * inverse[:, 2]
+    pairs = warp(frame.sight, frame.pairs, frame.blocks, block, inverse, samples.reach)
+    table = PlaneTable(pairs.triangle.size)
+    some = np.flatnonzero((pairs.box[1] >= pairs.box[0]) & (pairs.box[3] >= pairs.box[2]))
+    planes = table.add(pairs, some, DISPLACED).compact()
+    draw_displaced(planes, canvas, samples, limits, bits)
+    return Drawing(frame.blocks, canvas, table, limits, bits, samples)

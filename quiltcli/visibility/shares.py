@@ -17,6 +17,7 @@ from quiltcli.projection.planar import QuiltRays
 from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.binning.pairs import Cones, Cores, Parts, common_value, lit_cones, pairs_of
+from quiltcli.visibility.binning.patches import with_patch_cones
 from quiltcli.visibility.draw import (
     BlockPairs,
     Blocks,
@@ -116,6 +117,8 @@ def bin_plan(
 ) -> BinPlan:
     """The plan of a frame; `parts` are the convex pieces of the facets, in the world."""
     cones = lit_cones(parts, rays.lit, viewer.eye)
+    if rays.patched is not None:
+        cones = with_patch_cones(cones, rays.patched, blocks, reach)
     return BinPlan(scene, blocks, viewer, rays, cones, Cores(cones), culling, reach)
 
 

@@ -137,7 +137,8 @@ def test_job_brings_up_the_problems_of_the_files_it_names(tmp_path: Path) -> Non
     edited(tmp_path, "job.yaml", "scene: mesh.obj", "scene: scene.yaml")
     edited(tmp_path, "scene.yaml", "", "ligths: []\n")
     expected = [
-        "display.yaml:1:1: mesh: missing key (polygon mesh; or panels: flat rectangles)",
+        "display.yaml:1:1: mesh: missing key (polygon mesh; or panels: flat rectangles; or surfaces;"
+        " or a projection)",
         "scene.yaml:4:1: ligths: unknown key (did you mean 'lights'?)",
     ]
     assert messages(lambda: load_job(job), tmp_path) == expected

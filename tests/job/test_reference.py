@@ -21,6 +21,7 @@ BARE = {
     *("views", "first_view", "first_row", "count"),
     *("id", "page", "max_pages", "page_facets", "samples"),
     *("aspect", "metallic", "roughness", "specular", "scale", "matrix", "facets"),
+    *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces"),
     *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),
 }
 

@@ -12,8 +12,8 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "quiltcli"
 ORDER = (
-    *("ending", "errors", "geometry", "channels", "formats", "job", "display", "scene", "viewer", "layout"),
-    *("projection", "visibility", "shading", "halftone", "lightfield", "images", "ring", "render"),
+    *("ending", "errors", "geometry", "channels", "formats", "job", "charts", "display", "scene", "viewer"),
+    *("layout", "projection", "visibility", "shading", "halftone", "lightfield", "images", "ring", "render"),
     *("calibration", "analysis", "exchange", "api", "cli", "__main__"),
 )
 LIGHT = {"quiltcli.ending", "quiltcli.errors", "quiltcli"}

@@ -19,12 +19,12 @@ from quiltcli.analysis.simulate.picture import (
     displayed_light,
     exact,
     first_triangles,
-    mesh_scene,
     outlined,
     picture_rays,
     with_channels,
 )
-from quiltcli.display import Facets, lit_facets, triangulate
+from quiltcli.analysis.simulate.skin import skin_of
+from quiltcli.display import Facets, lit_facets
 from quiltcli.geometry import (
     BoolArray,
     Float32Array,
@@ -97,13 +97,19 @@ def _way_aside(viewer: Viewer, facets: Facets) -> FloatArray:
     return np.asarray(ways[int(seen[1] > 1.001 * seen[0])])
 
 
-def outline_points(viewer: Viewer, facets: Facets, lit: BoolArray, most: int = RAYS) -> FloatArray:
+def outline_points(
+    viewer: Viewer, facets: Facets, lit: BoolArray, most: int = RAYS, bent: FloatArray | None = None
+) -> FloatArray:
     """At most so many corners (N, 3) of lit facets on the display's outline as the eye sees it, well apart.
 
-    Around an eye that the display surrounds there is no outline: any corners then.
+    Around an eye that the display surrounds there is no outline: any corners then. Curved facets count by
+    the points of theirs that are given, `bent` (M, 3).
     """
     row, _ = segments(facets.corner_start)
-    corners = np.unique(facets.corners[lit[row]], axis=0)
+    flat = lit & ~facets.curved
+    corners = np.unique(facets.corners[flat[row]], axis=0)
+    if bent is not None:
+        corners = np.concatenate((corners, bent))
     if not len(corners):
         return corners
     way = normalized(corners - viewer.eye)
@@ -111,8 +117,8 @@ def outline_points(viewer: Viewer, facets: Facets, lit: BoolArray, most: int = R
     slope = dot(way, ahead)
     if slope.min() > 0.05:
         side = normalized(cross(ahead, np.eye(3)[int(np.argmin(np.abs(ahead)))]))
-        flat = np.stack((dot(way, side), dot(way, cross(ahead, side))), axis=1) / slope[:, None]
-        outline = hull(flat)
+        seen = np.stack((dot(way, side), dot(way, cross(ahead, side))), axis=1) / slope[:, None]
+        outline = hull(seen)
         corners, way, slope = corners[outline], way[outline], slope[outline]
     chosen = [int(np.argmin(slope))]
     while len(chosen) < min(most, len(corners)):
@@ -182,16 +188,17 @@ def third_person_light(
         scene: a name of `SCENES`.
         threads: batches drawn at a time.
     """
-    cut, facet_of = triangulate(stage.facets)
-    back = ~lit_facets(stage.facets, camera.eye)[facet_of]
-    triangles, behind = cut[~back], cut[back]
-    facet_of, facet_behind = facet_of[~back], facet_of[back]
-    reach = np.concatenate((stage.facets.corners, viewer.eye[None]))
+    skin = skin_of(stage.facets, viewer)
+    # The backs of flat facets are looked through, like glass.
+    back = ~lit_facets(stage.facets, camera.eye)[skin.facet]
+    rear = np.flatnonzero(back)
+    triangles, facet_of = skin.triangles[~back], skin.facet[~back]
+    reach = np.concatenate((skin.vertices, viewer.eye[None]))
     size = float(np.sqrt(dot(np.ptp(reach, axis=0), np.ptp(reach, axis=0))))
     thick = float(np.linalg.norm(through[0].dv[0])) * float(np.linalg.norm(reach.mean(axis=0) - camera.eye))
-    points = outline_points(viewer, stage.facets, shown.lit)
+    points = outline_points(viewer, stage.facets, shown.lit, bent=skin.lit_points())
     marks = viewer_marks(viewer, points, max(0.018 * size, 6 * thick), max(1.2 * thick, 1.2e-3 * size))
-    corners = stage.facets.corners
+    corners = skin.vertices
     everything = bare_scene(
         np.concatenate((corners, marks.vertices)),
         np.concatenate((triangles, marks.triangles + len(corners))).astype(np.int32),
@@ -201,13 +208,14 @@ def third_person_light(
     facet = np.concatenate((facet_of, [-1])).astype(np.int32)[
         np.where((met < 0) | (marked >= 0), len(facet_of), met)
     ]
-    light, _ = displayed_light(shown, camera, through, facet, how)
+    front = np.append(np.flatnonzero(~back), -1)[np.where(facet >= 0, met, -1)]
+    light, _ = displayed_light(shown, camera, through, facet, how, skin, front.astype(np.int32))
     on = np.flatnonzero(marked >= 0)
     light[:, on] = _mark_light(marks, marked[on], picture_rays(camera, through, on))
-    if len(behind):
-        walls = mesh_scene(corners, behind)
+    if rear.size:
+        walls = bare_scene(corners, skin.triangles[rear])
         pane, before = first_triangles(stage, camera, through, walls, threads)
-        panes = np.where(before < depth, np.append(facet_behind, -1)[pane], -1).astype(np.int32)
+        panes = np.where(before < depth, np.append(skin.facet[rear], -1)[pane], -1).astype(np.int32)
         light = _through_glass(shown, camera, through, panes, light)
     if scene != "none":
         light = _with_scene(stage, camera, through, light, depth, threads, solid=scene == "solid")

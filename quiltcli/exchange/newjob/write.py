@@ -21,9 +21,9 @@ from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.whole import make_folder, write_text
 from quiltcli.formats.yaml.source import Source
 from quiltcli.job import DisplayFile, PackSpec, PanelSpec, ResolutionSpec
-from quiltcli.job.display import PlaceOnPage
 from quiltcli.job.frames import parse_frames
 from quiltcli.job.model import MESHES, attach
+from quiltcli.job.places import PlaceOnPage
 from quiltcli.layout import Layout
 from quiltcli.layout.file import layout_text
 from quiltcli.layout.from_job import layout_for

@@ -14,7 +14,9 @@ import numpy as np
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import Crew
+from quiltcli.render.frame import TooNearError
 from quiltcli.render.frame import draw_frame as rasterize_frame
+from quiltcli.render.methods.cubemap import draw_cubemap
 from quiltcli.render.methods.raycast import cast_frame
 from quiltcli.render.methods.twopass import draw_twice
 from quiltcli.render.report import FrameRecord, together
@@ -27,6 +29,7 @@ __all__ = ["OTHERS", "draw_frame", "draw_view"]
 OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], FrameRecord]] = {
     "twopass": draw_twice,
     "raycast": cast_frame,
+    "cubemap": draw_cubemap,
 }
 """Methods that do not rasterize the quilt."""
 
@@ -45,7 +48,14 @@ def draw_frame(
     other = OTHERS.get(stage.job.render.method)
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
-    return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, crew=crew)
+    try:
+        return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, crew=crew)
+    except TooNearError:
+        if stage.job.render.samples > 1:
+            raise
+        if dirty is not None:
+            dirty[:] = True
+        return cast_frame(stage, viewer, buffers, threads, only)
 
 
 def draw_view(

@@ -17,7 +17,7 @@ import numpy as np
 
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
-from quiltcli.projection.planar import quilt_rays
+from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background
 from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
@@ -28,7 +28,7 @@ from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Hits
 from quiltcli.visibility.rays.embree import Target, aim, cast, plane_distance, reach_along
 from quiltcli.visibility.rays.exact import Neighbours, intersect
-from quiltcli.visibility.rays.pixels import OFFSETS, Places, places
+from quiltcli.visibility.rays.pixels import OFFSETS, Places, lit_pixels, places
 from quiltcli.visibility.resolve.hits import point_hits
 from quiltcli.visibility.setup.planes import LATTICE
 
@@ -50,13 +50,14 @@ def cast_frame(
     lit = lit_facets(stage.facets, viewer.eye)
     if only is not None:
         lit &= only
-    rays = quilt_rays(stage.layout, lit, viewer.eye)
+    rays = viewer_rays(stage.layout, stage.facets, lit, viewer)
     target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     clear(stage, buffers, only)
-    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers)
+    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers, rays)
 
     def draw(address: IntArray) -> int:
+        address = address[lit_pixels(address, stage.layout, stage.owners, rays)]
         pixels = places(address, stage.layout, stage.owners, rays)
         hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals)
         if hits.triangle.size:

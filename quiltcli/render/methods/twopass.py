@@ -19,7 +19,7 @@ from quiltcli.channels import CHANNELS
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.projection.camera import camera_display, viewer_frustum
-from quiltcli.projection.planar import quilt_rays
+from quiltcli.projection.planar import quilt_rays, viewer_rays
 from quiltcli.render.buffers import Buffers, clear, new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.methods.raycast import pixels_of
@@ -47,7 +47,7 @@ def draw_twice(
         lit &= only
     clear(stage, buffers, only)
     visible = outside = 0
-    rays = quilt_rays(stage.layout, lit, viewer.eye)
+    rays = viewer_rays(stage.layout, stage.facets, lit, viewer)
     for address in pixels_of(stage, rays.lit):
         pixels = places(address, stage.layout, stage.owners, rays)
         place = _projected(to_picture, pixels.directions())

@@ -71,7 +71,7 @@ def draw_large(
         # What small triangles drew, and what covers a microtile, hides spans as a whole.
         least = least_keys(canvas)
         np.greater(least, 0, out=canvas.full)
-        spans = _not_behind(spans, np.maximum(least, covering), bits)
+        spans = not_behind(spans, np.maximum(least, covering), bits)
         spans = spans.take(np.flatnonzero(~_behind_cover(planes, spans, covering, bits)))
         spans = _fill(planes, spans, canvas)
         # Backs and walls come last: pieces of other surfaces may hide them together.
@@ -82,12 +82,12 @@ def draw_large(
         # Only where something is left need the least keys be found again.
         left = np.zeros(canvas.touched.size, dtype=np.bool_)
         left[spans.tile] = True
-        spans = _not_behind(spans, least_keys(canvas, left), bits)
+        spans = not_behind(spans, least_keys(canvas, left), bits)
     _draw_rounds(planes, spans, canvas, limits, bits, by)
     return (drawn + spans.row.size) * MICROTILE * MICROTILE
 
 
-def _not_behind(spans: Spans, least: IntArray, bits: int) -> Spans:
+def not_behind(spans: Spans, least: IntArray, bits: int) -> Spans:
     """The spans that are not wholly behind the `least` keys (M,) that the pixels of their microtiles have."""
     return spans.take(np.flatnonzero(spans.greatest >= depth_part(least, bits).take(spans.tile)))
 
@@ -132,7 +132,7 @@ def _draw_rounds(
 ) -> None:
     """Evaluate the microtiles' pixels, in rounds in which every microtile occurs once."""
     canvas.touched[spans.tile] = True
-    group, order = _rounds(spans)
+    group, order = rounds(spans)
     spans = spans.take(order)
     bounds = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
     for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
@@ -143,7 +143,7 @@ def _draw_rounds(
             canvas.keys[few.tile] = np.maximum(keys, _tile_keys(planes, few, limits, bits, by), out=keys)
 
 
-def _rounds(spans: Spans) -> tuple[IntArray, IntArray]:
+def rounds(spans: Spans) -> tuple[IntArray, IntArray]:
     """Numbers of groups (S,) to be evaluated together, ascending, and the spans in their order (S,).
 
     In a group no microtile comes twice, and, but for the late rounds, the same edges cross all: few

@@ -141,7 +141,7 @@ def _behind(planes: Planes, row: IntArray, x: IntArray, y: IntArray, covered: Bo
     """Which pairs lie, in a tile at x, y (S,), wholly behind one that covers it."""
     least, greatest = _extremes(np.take(planes.inverse, row, axis=1), x, y)
     low, high = planes.low.take(row), planes.high.take(row)
-    least, greatest = _held(least, low, high), _held(greatest, low, high)
+    least, greatest = held(least, low, high), held(greatest, low, high)
     per_block = (SIDE // TILE) ** 2
     place = planes.block.take(row) * np.int64(per_block) + y // TILE * (SIDE // TILE) + x // TILE
     nearest = np.zeros(int(place.max(initial=-1)) + 1)
@@ -151,7 +151,7 @@ def _behind(planes: Planes, row: IntArray, x: IntArray, y: IntArray, covered: Bo
     return result
 
 
-def _held(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+def held(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Values of 1/t (S,) held between those of the corners, as they are where they are drawn."""
     return np.minimum(np.maximum(values, low, out=values), high, out=values)
 
@@ -217,8 +217,8 @@ def _class_spans(
         x=x * MICROTILE,
         y=y * MICROTILE,
         crossed=crossed.ravel().take(keep),
-        least=_held(values + down.take(piece), low, high),
-        greatest=_held(values + up.take(piece), low, high),
+        least=held(values + down.take(piece), low, high),
+        greatest=held(values + up.take(piece), low, high),
     )
 
 

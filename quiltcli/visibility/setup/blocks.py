@@ -31,6 +31,7 @@ T = TypeVar("T", bound=np.generic)
 SIDE = 512
 BATCH_PIXELS = 1 << 21
 BATCH_PAIRS = 1 << 17
+PATCH_PIXELS = 1 << 19
 _LEAST_PIXELS = 1 << 20
 _SHARES = 3  # of a worker, if they do not get too small, so that none waits long for the last
 _NOT_SEEN = np.float64(np.inf).view(np.int64)
@@ -58,6 +59,8 @@ class Blocks:
         used: (microtiles,) those that have pixels of the facet or its bleed.
         owned: (microtiles, 8) uint8, bits of the pixels that are the facet's or its bleed, row by row.
         inside: (microtiles, 8) uint8, bits of those that lie in the facet.
+        flat: how many of the blocks are flat facets'; behind them, each a row of `start` of its own, come the
+            patches of curved ones.
     """
 
     start: IntArray
@@ -76,6 +79,7 @@ class Blocks:
     used: BoolArray
     owned: NDArray[np.uint8]
     inside: NDArray[np.uint8]
+    flat: int
 
     def tiles(self, blocks: tuple[int, int]) -> slice:
         """The microtiles of a range of blocks."""
@@ -150,6 +154,7 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
         used=np.asarray(owned.any(axis=1)),
         owned=owned,
         inside=inside,
+        flat=facet.size,
     )
 
 
@@ -182,12 +187,12 @@ def _owned_pixels(
         mine = np.zeros((-(-h // 8) * 8, -(-w // 8) * 8), dtype=owners.dtype)
         mine[:h, :w] = window(owners, first, step, w, h)
         polygon = mine == f + 1
-        owned.append(_tile_bits(polygon | (mine == -f - 1)))
-        inside.append(_tile_bits(polygon))
+        owned.append(tile_bits(polygon | (mine == -f - 1)))
+        inside.append(tile_bits(polygon))
     return np.concatenate(owned), np.concatenate(inside)
 
 
-def _tile_bits(mask: BoolArray) -> NDArray[np.uint8]:
+def tile_bits(mask: BoolArray) -> NDArray[np.uint8]:
     """A mask of whole microtiles as bits (microtiles, 8), row by row."""
     rows = np.packbits(mask, axis=1)
     return rows.reshape(len(mask) // 8, 8, -1).transpose(0, 2, 1).reshape(-1, 8)
@@ -219,7 +224,11 @@ def cut_batches(
     batches = []
     first, begun, pixels, pairs = 0, False, 0, 0
     for block in np.flatnonzero(wanted).tolist():
-        if begun and (pixels + area[block] > most or pairs + counts[block] > BATCH_PAIRS):
+        full = pixels + area[block] > most or pairs + counts[block] > BATCH_PAIRS
+        # What is curved is drawn in another way, with more to remember of each pixel.
+        if begun and (
+            full or first < blocks.flat <= block or (first >= blocks.flat and pixels > PATCH_PIXELS)
+        ):
             batches.append((first, block))
             first, pixels, pairs = block, 0, 0
         begun = True

@@ -205,6 +205,7 @@ def warp(
     blocks: Blocks,
     block: IntArray,
     matrices: FloatArray,
+    reach: FloatArray | None = None,
 ) -> Warped:
     """The pairs of some blocks in homogeneous pixels, in the order of `block_pairs`.
 
@@ -214,6 +215,7 @@ def warp(
         blocks: the blocks.
         block: (K,) the blocks of the batch, ascending.
         matrices: (K, 3, 3) from `block_matrices`.
+        reach: (K, 2) how far samples lie beside the centres of the blocks' pixels; None for there.
     """
     triangle, place = block_pairs.of(block)
     matrices = np.ascontiguousarray(matrices.transpose(1, 2, 0))
@@ -226,6 +228,10 @@ def warp(
         world = gather_corners(sight.vertices, sight.triangles.take(triangle[part], axis=0))
         project(world, np.take(matrices, place[part], axis=2), corners[:, :, part])
         width, height = (size.take(place[part]) for size in extent)
-        box[:, part] = pixel_boxes(corners[:, :, part], width, height)
+        if reach is None:
+            box[:, part] = pixel_boxes(corners[:, :, part], width, height)
+        else:
+            beside = reach[:, 0].take(place[part]), reach[:, 1].take(place[part])
+            box[:, part] = pixel_boxes(corners[:, :, part], width, height, beside)
         np.maximum(box[0, part], margin.take(place[part]), out=box[0, part])
     return Warped(triangle, place.astype(np.int32), corners, box, sight.cut.take(triangle))
