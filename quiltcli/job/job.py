@@ -122,7 +122,7 @@ class RenderSpec(Model):
     anisotropy: Annotated[int, Field(ge=1, le=MOST_PLACES)] = 16
     """Places of a texture that a pixel looks at, at most; more are sharper where surfaces are seen aslant."""
     max_texture: Annotated[int, Field(ge=1, le=65536)] = 8192
-    """Largest side of a texture, texels; larger pictures are reduced."""
+    """Largest side of a texture, pixels; larger pictures are reduced."""
     texture_memory: Annotated[float, Field(gt=0, le=1_000_000)] = 4096.0
     """Memory that all textures may take together, megabytes."""
 

@@ -54,15 +54,15 @@ class TexturesSpec(Model):
     occlusion: Picture | None = None
     """Picture of how much of the ambient light arrives, of which red counts."""
     scale: Vec2 = (1.0, 1.0)
-    """How often the pictures are there for one of the mesh's texture coordinates, along u and v."""
+    """How many times the pictures are there in the mesh's texture coordinates from 0 to 1, along u and v."""
     offset: Vec2 = (0.0, 0.0)
     """Added to texture coordinates after that; v is up."""
     wrap: Annotated[str, OneOf(("repeat", "clamp", "mirror"))] = "repeat"
     """What is beyond a picture's edges: itself again, its edge, or its mirror image."""
     uv_set: Annotated[int, Field(ge=0, le=1)] = 0
-    """Which of the mesh's texture coordinates."""
+    """Which of the mesh's texture coordinates, the number of the set."""
     strength: Number = 1.0
-    """Strength of the normal map: 0 flat, 1 as it is."""
+    """Strength of the normal map: how many times its slopes; 0 is flat."""
 
     def pictures(self) -> dict[str, Path]:
         """The pictures by what they vary."""

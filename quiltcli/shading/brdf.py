@@ -201,7 +201,7 @@ def glints(
     spread *= spread
     spread /= half_angle
     np.minimum(spread, np.float32(2), out=spread)
-    spread *= (a2 - _ONE) * _HALF
+    spread = _scaled(spread, (a2 - _ONE) * _HALF)
     spread += _ONE
     spread *= spread
     # G over 4 (n·l)(n·v), whose numerator and denominator share factors.
@@ -236,8 +236,7 @@ def _fresnel(
 
 def _masking_root(cosine: Float32Array, alpha2: Values) -> Float32Array:
     """√(α² + (1 − α²)·cosine²), of Smith's masking and shadowing."""
-    root = cosine * cosine
-    root *= _ONE - alpha2
+    root = _scaled(cosine * cosine, _ONE - alpha2)
     root += alpha2
     result: Float32Array = np.sqrt(root, out=root)
     return result
@@ -245,10 +244,16 @@ def _masking_root(cosine: Float32Array, alpha2: Values) -> Float32Array:
 
 def _let_through(cosine: Float32Array, coat: Values) -> Float32Array:
     """What a layer lets through at an angle: 1 less the rise of its reflection towards the rim."""
-    result = _fifth(_ONE - cosine)
-    result *= -coat
+    result = _scaled(_fifth(_ONE - cosine), -coat)
     result += _ONE
     return result
+
+
+def _scaled(values: Float32Array, factor: Values) -> Float32Array:
+    """Values times what may vary more than they do; they make way for the result if it has room there."""
+    room = isinstance(factor, np.float32) or factor.size == 1 or values.shape == factor.shape
+    room = room or (values.shape[1] >= factor.shape[1] and values.shape[0] == factor.shape[0])
+    return np.multiply(values, factor, out=values if room else None)
 
 
 def _fifth(value: Float32Array) -> Float32Array:

@@ -61,8 +61,6 @@ class Picture:
         try:
             return from_bytes(read_input(Path(self.path), SceneError, "a picture"))
         except UnreadablePictureError as error:
-            raise SceneError(Problem(f"{use}: the picture cannot be read: {error}", self.path)) from None
+            raise SceneError(Problem(f"{use}: cannot be read: {error}", self.path)) from None
         except SceneError as error:
-            raise SceneError(
-                [Problem(f"{use}: the picture {p.message}", p.file) for p in error.problems]
-            ) from None
+            raise SceneError([Problem(f"{use}: {p.message}", p.file) for p in error.problems]) from None

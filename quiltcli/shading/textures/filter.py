@@ -157,7 +157,7 @@ def _log2(value: Float32Array) -> Float32Array:
     exponent = (bits >> 23) - 127
     part = ((bits & 0x7FFFFF) | 0x3F800000).view(np.float32)
     result: Float32Array = exponent.astype(np.float32)
-    result += (part - _ONE) * (np.float32(1.6838) - np.float32(0.3419) * (part - _ONE))
+    result += (part - _ONE) * (np.float32(1.6838) - np.float32(0.3419) * part)
     return result
 
 
