@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from quiltcli.channels import CHANNELS, MOST_HALF
 from quiltcli.geometry import FloatArray
 from quiltcli.scene import Scene
+from quiltcli.scene.textures.coordinates import corner_coordinates
 from quiltcli.shading.adaptive import Shaded, shaded
 from quiltcli.shading.materials import albedo_wants
 from quiltcli.shading.nodes import NodeColors
 from quiltcli.shading.shade import Shades, shading_wants
 from quiltcli.shading.surface import shading_normals
 from quiltcli.shading.textures.covers import UNLIT
-from quiltcli.shading.textures.lookup import texture_corners
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Drawing, Wanted
 
@@ -93,7 +93,7 @@ def _texture_place(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
     """Texture coordinates of the first set, v up."""
     seen = shaded.hits.points
     assert seen.weights is not None
-    corners = texture_corners(shaded.scene, seen.triangle[:, 0], 0)[..., None]
+    corners = corner_coordinates(shaded.scene, seen.triangle[:, 0], 0)[..., None]
     second, third = (corners[:, k] - corners[:, 0] for k in (1, 2))
     return tuple(corners[:, 0] + second * seen.weights[0] + third * seen.weights[1])
 

@@ -25,7 +25,7 @@ from quiltcli.scene.materials import Texture
 from quiltcli.scene.textures.levels import Texels, level_sizes, levels_of
 from quiltcli.scene.textures.picture import Picture
 
-ROLES = ("color", "emission", "metallic", "roughness", "occlusion")
+ROLES = ("color", "emission", "metallic", "roughness", "normal", "occlusion")
 """What textures vary that are drawn."""
 IN_SRGB = ("color", "emission")
 """Roles of textures whose numbers are encoded for displays."""
