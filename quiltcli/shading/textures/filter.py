@@ -1,4 +1,4 @@
-"""Looking textures up: bilinear between texels, trilinear between levels, anisotropic along footprints.
+"""Looking textures up: bilinear between texels, linear between levels, anisotropic along footprints.
 
 A pixel's footprint in a texture is an ellipse, the image of a circle by the Jacobian of the texture's
 coordinates. Its axes are singular values; several places along the longer one, each as wide as the shorter,
@@ -20,7 +20,9 @@ from quiltcli.scene.textures.pool import Textures
 _CHUNK = 1 << 14  # places that fit the cache
 _ONE, _HALF = np.float32(1), np.float32(0.5)
 _MOST_STEP = np.float32(1e8)  # texels from pixel to pixel; the smallest level shows wherever it is more
+_DENSE = np.float32(0.75)  # places in as much of the longer axis as the shorter is long
 _TINY = np.float32(1e-20)
+_TWO_LEVELS, _WRAP = np.uint16(128), np.uint16(256)  # of numbers for how places are filtered
 # A half float's bits, moved to where a single's are, are its value times 2⁻¹¹². The weights make up for it:
 # a product of two small numbers would be denormal, which is ten times as slow.
 _SCALE = np.float32(2.0**112)
@@ -83,38 +85,43 @@ def _filtered(
     wrap = textures.wrap.take(image, axis=0)
     wide, high = textures.width.take(base), textures.height.take(base)
     count, level, du, dv = _ellipse(slopes, wide, high, textures.anisotropy)
-    # All that are filtered alike together: places that show texels enlarged, and others by how many
-    # places along the ellipse they look at.
-    kind = count + np.uint16(128) * (3 * wrap[:, 0] + wrap[:, 1]).astype(np.uint16)
+    near, share = _between_levels(level, last - base)
+    # All that are filtered alike together: places that show texels enlarged, others by how many places along
+    # the ellipse they look at, and whether in one level or in two.
+    kind = count + _TWO_LEVELS * (share > 0) + _WRAP * (3 * wrap[:, 0] + wrap[:, 1]).astype(np.uint16)
     present = np.flatnonzero(np.bincount(kind))
     order = None if present.size == 1 else np.argsort(kind, kind="stable")
     end = 0
     for which in present.tolist():
-        if order is None:
-            some: Any = slice(None)
-        else:
+        some: Any = slice(None)
+        if order is not None:
             start, end = end, end + int(np.count_nonzero(kind == which))
             some = order[start:end]
-        code, places = divmod(which, 128)
-        one = slice(None) if base.size == 1 else some
-        rows = base[one]
+        code, rest = divmod(which, int(_WRAP))
+        two, places = divmod(rest, int(_TWO_LEVELS))
         along = _Along(u[some], v[some], du[some], dv[some], divmod(code, 3))
-        if not places:
-            value = _sum(textures, along, 1, [(_levels(textures, rows), _SCALE)], channels)
-        else:
-            depth = np.minimum(level[some], (last - base)[one].astype(np.float32))
-            whole = np.floor(depth)
-            share = depth - whole
-            near = rows + whole.astype(np.int32)
-            far = np.minimum(near + 1, last[one])
-            weight = share * (_SCALE / np.float32(places))
-            both = [
-                (_levels(textures, near), _SCALE / np.float32(places) - weight),
-                (_levels(textures, far), weight),
-            ]
-            value = _sum(textures, along, places, both, channels)
-        for k, values in enumerate(value):
+        rows = (base if base.size == 1 else base[some]) + near[some]
+        weight = _SCALE / np.float32(max(places, 1))
+        weighted: list[tuple[_Levels, Any]] = [(_levels(textures, rows), weight)]
+        if two:
+            part = share[some] * weight
+            weighted = [(weighted[0][0], weight - part), (_levels(textures, rows + 1), part)]
+        for k, values in enumerate(_sum(textures, along, max(places, 1), weighted, channels)):
             out[k, some] = values
+
+
+def _between_levels(level: Float32Array, last: Int32Array) -> tuple[Int32Array, Float32Array]:
+    """The nearer level (n,) below, and how much of the next one there is (n,).
+
+    Levels are blended in the middle half between them alone: elsewhere one of them is enough.
+    """
+    whole = np.floor(level)
+    share = np.clip((level - whole) * np.float32(2) - _HALF, np.float32(0), _ONE)
+    near = whole.astype(np.int32)
+    near += share == _ONE
+    share[share == _ONE] = 0
+    share[near >= last] = 0
+    return np.minimum(near, last), share
 
 
 def _ellipse(
@@ -139,7 +146,7 @@ def _ellipse(
     spread = np.sqrt(half * half + q * q)
     long2 = mean + spread
     short2 = np.maximum(mean - spread, _ONE)
-    count = np.minimum(np.ceil(np.sqrt(long2 / short2)), np.float32(most))
+    count = np.minimum(np.ceil(_DENSE * np.sqrt(long2 / short2)), np.float32(most))
     np.maximum(count, _ONE, out=count)
     level = np.maximum(_log2(np.maximum(long2 / (count * count), _ONE)) * _HALF, np.float32(0))
     # The eigenvector of the longer axis, by the row that says more of it.
