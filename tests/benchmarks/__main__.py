@@ -93,8 +93,9 @@ def _measure(
                 results.setdefault("duels", {})[name] = found
                 keep(name)
         if "textures" in parts:
-            results["textures"] = textured.measure(rounds, Path(scratch))
-            keep("textures")
+            for name in ("mixed",) if quick else textured.SCENES:
+                results.setdefault("textures", {})[name] = textured.measure(name, rounds, Path(scratch))
+                keep(f"textures, {name}")
         if "sequences" in parts:
             for compression in ("zip",) if quick else ("zip", "zstd"):
                 one = sequence.measure(meshes.detailed(3), 4 if quick else 20, compression, Path(scratch))

@@ -86,22 +86,15 @@ def ratio_table(results: Mapping[str, Any], clock: str = "wall") -> str:
 
 
 def texture_table(results: Mapping[str, Any]) -> str:
-    """Textured frames beside plain ones."""
-    found = results["textures"]
+    """Textured frames beside plain ones, in processor time of one process."""
     rows = []
-    for kind in ("plain", "trilinear", "anisotropic"):
-        one, many = (nanoseconds(found, f"{kind}{more}") for more in ("", ", 16 samples"))
-        cells = (
-            one,
-            one / nanoseconds(found, "plain"),
-            many,
-            many / one,
-            nanoseconds(found, f"opengl {kind}"),
-        )
-        plain, other, samples, times, theirs = cells
-        rows.append((kind, f"{plain:.0f}", share(other), f"{samples:,.0f}", f"{times:.1f}", ns(theirs)))
-    head = ("the room", "ns a pixel", "/ plain", "16 samples", "/ 1 sample", "GL draws")
-    return table(head, rows)
+    for name, found in results["textures"].items():
+        for kind in ("plain", "trilinear", "anisotropic"):
+            one, many = (nanoseconds(found, f"{kind}{more}") for more in ("", ", 16 samples"))
+            more, theirs = one / nanoseconds(found, "plain"), nanoseconds(found, f"opengl {kind}")
+            rows.append((name, kind, ns(one), share(more), ns(many), f"{many / one:.1f}", ns(theirs)))
+    head = ("scene", "", "ns a pixel", "/ plain", "16 samples", "/ 1 sample", "GL draws")
+    return table(head, rows, 2)
 
 
 def ns(value: float) -> str:

@@ -1,4 +1,4 @@
-"""What textures cost: the room covered with one picture against the same room in one colour."""
+"""What textures cost: scenes covered with one picture against the same scenes in one colour."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from quiltcli.scene.materials import Texture
 from quiltcli.scene.textures.picture import Picture
 from quiltcli.scene.textures.pool import TextureLimits, TextureStore
 from tests.benchmarks import meshes, opengl
-from tests.benchmarks.race import race
+from tests.benchmarks.race import race, seconds
 from tests.benchmarks.stages import DENSITY, binned, cube, stage_for, viewer_of
 
 PAGE = 2048
@@ -30,24 +30,27 @@ _TEXELS = 2048
 _REPEAT = 1.5  # metres that the picture spans
 
 
-def measure(rounds: int, scratch: Path) -> dict[str, Any]:
+SCENES: Mapping[str, Callable[[], meshes.Mesh]] = {"mixed": meshes.mixed, "room": meshes.room}
+
+
+def measure(name: str, rounds: int, scratch: Path) -> dict[str, Any]:
     """Times of whole frames by one process, and of OpenGL's draws of the same picture."""
     place = cube(DENSITY * PAGE / 8192)
-    plain = stage_for(place, meshes.room(), (PAGE, PAGE))
+    plain = stage_for(place, SCENES[name](), (PAGE, PAGE))
     viewer = viewer_of(place)
     picture = _picture()
     Image.fromarray(picture).save(scratch / "picture.png")
     stages = {"plain": plain, "plain, 16 samples": _sampled(plain, 16)}
     for most in (1, 16):
         covered = _covered(plain, scratch / "picture.png", most)
-        name = "trilinear" if most == 1 else "anisotropic"
-        stages[name] = covered
-        stages[f"{name}, 16 samples"] = _sampled(covered, 16)
+        kind = "trilinear" if most == 1 else "anisotropic"
+        stages[kind] = covered
+        stages[f"{kind}, 16 samples"] = _sampled(covered, 16)
     buffers = new_buffers(plain)
     pixels = draw_frame(plain, viewer, buffers).visible_pixels
     with ExitStack() as ends:
         contestants: dict[str, Callable[[], object]] = {
-            name: partial(draw_frame, stage, viewer, buffers) for name, stage in stages.items()
+            kind: partial(draw_frame, stage, viewer, buffers) for kind, stage in stages.items()
         }
         if not opengl.renderer().startswith("-"):
             frame = binned(stages["trilinear"], viewer).frame
@@ -55,8 +58,8 @@ def measure(rounds: int, scratch: Path) -> dict[str, Any]:
             ends.enter_context(quilt)
             contestants["opengl plain"] = partial(quilt.draw, "ggx")
             contestants["opengl trilinear"] = partial(quilt.draw, "textured")
-        brief = [name for name in contestants if "samples" in name]
-        times = race(contestants, rounds, cold=brief)
+        brief = [kind for kind in contestants if "samples" in kind]
+        times = race(contestants, rounds, cold=brief, brief=brief)
     return {"pixels": pixels, "times": times}
 
 
@@ -91,6 +94,5 @@ def _picture() -> NDArray[np.uint8]:
 
 
 def nanoseconds(found: Mapping[str, Any], name: str) -> float:
-    """Of a whole frame for a visible pixel, the quickest round; not a number for what was left out."""
-    times = found["times"]
-    return min(times[name]["wall"]) / found["pixels"] * 1e9 if name in times else float("nan")
+    """Processor time of a whole frame for a visible pixel; not a number for what was left out."""
+    return seconds(found["times"], name, "cpu") / found["pixels"] * 1e9
