@@ -13,7 +13,7 @@ from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.formats.exr.image import Image, part_names, read_exr, write_exr
 from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import Float32Array
-from quiltcli.images.names import frame_digits, name_of
+from quiltcli.images.names import frame_digits, names_in
 from quiltcli.images.stereo.anaglyph import MATRICES, anaglyph, luma
 from quiltcli.images.stereo.packing import (
     PACKINGS,
@@ -29,7 +29,6 @@ from quiltcli.layout import Layout, pixel_owners, read_layout
 
 EYES = ("left", "right")
 MODES = ("anaglyph", *PACKINGS, *TURNS, "sequential", "rgb-frames")
-FOLDERS = {"page": "quilt", "facet": "facets"}
 
 
 @dataclass(frozen=True)
@@ -93,9 +92,8 @@ def find_pairs(out: Path, options: StereoOptions) -> list[Pair]:
     """The pairs of images that a folder holds, by number, then by frame (OutputError if there are none)."""
     kind = options.kind
     found: dict[tuple[int, int], dict[str, tuple[Path, str]]] = {}
-    for path in sorted((out / FOLDERS[kind]).glob(f"{kind}_*.exr")):
-        name = name_of(path)
-        if name is None or (options.frames is not None and name.frame not in options.frames):
+    for name, path in names_in(out).found(out):
+        if name.kind != kind or (options.frames is not None and name.frame not in options.frames):
             continue
         eyes = (name.eye,) if name.eye else [part for part in part_names(path) if part in EYES]
         for eye in eyes:
