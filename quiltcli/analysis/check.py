@@ -47,12 +47,13 @@ from quiltcli.render.needs import demand_memory, method_problems
 from quiltcli.render.notices import job_warnings
 from quiltcli.render.ring.setup import notices as ring_notices
 from quiltcli.render.ring.setup import set_ring_stage
-from quiltcli.render.setup import facets_and_layout
+from quiltcli.render.setup import facets_and_layout, texture_limits
 from quiltcli.render.unseen import unseen_notices
 from quiltcli.ring.build import rig_of
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
+from quiltcli.scene.textures.pool import check_textures
 from quiltcli.viewer.clip import settled_clip, their_lit_facets
 from quiltcli.viewer.view import View, facet_problems, view_problems, viewers_of, views_of
 
@@ -132,6 +133,9 @@ class _Findings:
             lacking = list(source.problems(job.frames)) if source is not None else []
             self.problems += lacking
             source = None if lacking else source
+            if scene is not None:
+                drawn = (texture for textures in scene.materials.textures for texture in textures)
+                self.run(check_textures, drawn, texture_limits(job))
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
         return scene, source
