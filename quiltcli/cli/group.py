@@ -12,6 +12,7 @@ from quiltcli.ending import end_by_error, ended
 from quiltcli.errors import QuiltError
 
 COMMANDS = (
+    "calibrate",
     "cameras",
     "check",
     "compare",

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.inputs import check_input
 from quiltcli.formats.yaml.source import Source, YamlFile, parse_yaml
+from quiltcli.job.camera import CameraFile
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import LayoutFile, PackSpec
@@ -21,7 +22,9 @@ from quiltcli.job.scene import ObjectSpec, SceneFile
 
 M = TypeVar("M", bound=FileModel)
 T = TypeVar("T")
-MODELS: dict[str, type[FileModel]] = {m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile)}
+MODELS: dict[str, type[FileModel]] = {
+    m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile, CameraFile)
+}
 
 
 def load_display_file(path: Path | str) -> DisplayFile:
@@ -31,6 +34,15 @@ def load_display_file(path: Path | str) -> DisplayFile:
         JobError: with every problem of the file.
     """
     return _load(DisplayFile, parse_yaml(path))
+
+
+def load_camera_file(path: Path | str) -> CameraFile:
+    """Read a camera file.
+
+    Raises:
+        JobError: with every problem of the file.
+    """
+    return _load(CameraFile, parse_yaml(path))
 
 
 def load_layout_file(path: Path | str) -> LayoutFile:
