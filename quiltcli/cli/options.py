@@ -162,9 +162,9 @@ def _map_formats() -> Iterable[str]:
 
 
 def _patterns() -> Iterable[str]:
-    from quiltcli.calibration.pattern import KINDS
+    from quiltcli.calibration.pattern import KINDS, MARKERS
 
-    return (*KINDS, "all")
+    return (*KINDS, MARKERS, "all")
 
 
 def _job_keys() -> Iterable[str]:

@@ -14,6 +14,7 @@ from quiltcli.formats.inputs import check_input
 from quiltcli.formats.yaml.source import Source, YamlFile, parse_text, parse_yaml
 from quiltcli.formats.yaml.syntax import read_text
 from quiltcli.job.calibration import CalibrationFile
+from quiltcli.job.camera import CameraFile
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.job import RING_METHODS, JobFile
 from quiltcli.job.layout import LayoutFile, PackSpec, UvLayoutSpec
@@ -29,6 +30,7 @@ T = TypeVar("T")
 _FIRST_KEY = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\n)*(\w+):")
 MODELS: dict[str, type[FileModel]] = {
     **{m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile, LightfieldFile, CalibrationFile)},
+    CameraFile.kind: CameraFile,
     "quilt_lightfield360": MirrorDisplayFile,
 }
 
@@ -70,6 +72,15 @@ def load_any_display(path: Path | str) -> DisplayFile | MirrorDisplayFile:
         JobError: with every problem of the file.
     """
     return load_mirror_file(path) if "kind" in parse_yaml(path).data else load_display_file(path)
+
+
+def load_camera_file(path: Path | str) -> CameraFile:
+    """Read a camera file.
+
+    Raises:
+        JobError: with every problem of the file.
+    """
+    return _load(CameraFile, parse_yaml(path))
 
 
 def load_layout_file(path: Path | str) -> LayoutFile:

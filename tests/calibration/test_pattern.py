@@ -277,7 +277,7 @@ def test_wrong_wishes_are_told_together(tmp_path):
     with pytest.raises(OutputError) as caught:
         write_patterns(turned_layout(), tmp_path / "new", ["id", "grit"], image_format="gif", step=0)
     assert str(caught.value).splitlines() == [
-        "unknown pattern 'grit' (known: id, marker, border, grid, checker, gradient, white)",
+        "unknown pattern 'grit' (known: id, marker, border, grid, checker, gradient, white, markers)",
         "unknown image format 'gif' (known: png, exr)",
         "a step of 0 pixels; it must be 1 or more",
     ]
