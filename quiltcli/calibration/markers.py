@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.calibration.dictionaries import dictionary
+from quiltcli.calibration.dictionaries import DICTIONARIES, dictionary
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import DisplayError, JobError, Problem, counted
 from quiltcli.formats.inputs import read_input
@@ -237,11 +237,13 @@ def read_markers(path: Path) -> MarkerSet:
     Raises:
         JobError: no such file, or not one of these.
     """
+    name = ""
+    markers: tuple[Marker, ...] = ()
     try:
         found = json.loads(read_input(path, JobError, "a markers.json"))
+        name = found["dictionary"]
         markers = tuple(_marker(entry) for entry in found["markers"])
-        dictionary(found["dictionary"])
-        known = found["quilt_markers"] == 1
+        known = found["quilt_markers"] == 1 and name in DICTIONARIES
     except (ValueError, KeyError, TypeError, RecursionError):
         known = False
     if not known:
@@ -249,7 +251,7 @@ def read_markers(path: Path) -> MarkerSet:
         raise JobError(Problem(message, file=str(path)))
     if len({marker.id for marker in markers}) < len(markers):
         raise JobError(Problem("names a marker twice", file=str(path)))
-    return MarkerSet(found["dictionary"], markers)
+    return MarkerSet(name, markers)
 
 
 def _marker(entry: Mapping[str, Any]) -> Marker:

@@ -31,6 +31,13 @@ points:                           # marks on the mirror, and the pixels that lig
 free: [f, rotation, position]     # the centre is known
 centre: [384, 384]
 """,
+    "camera": """\
+quilt_camera: 1
+size: [4000, 3000]
+focal: [3102.4, 3102.4]
+centre: [2009.1, 1488.6]
+distortion: [-0.094, 0.027, 0.0006, -0.0004, 0]
+""",
     "lightfield": """\
 quilt_lightfield: 1
 images: h{row:02}/v{view:04}.png  # and {frame} for animations
@@ -100,6 +107,7 @@ background: [0, 0, 0]
 INTRODUCTIONS = {
     "calibration": "Marks on a spinning mirror and the pixels of the projector's image that light them."
     " `quilt calibrate` finds the projector.",
+    "camera": "A camera that takes photos of a display for `quilt calibrate`, which also writes such a file.",
     "lightfield": "Pictures of an object from a ring of places around it, which a display with a spinning"
     " mirror can show. `quilt capture` makes them of a scene.",
     "display": "Which mesh is the display, how large it is, and how many pixels its facets have. `quilt pack`"
