@@ -36,6 +36,7 @@ LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
 COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
 CLIPS = ("auto", "planar", "distance")
 STEREO = ("files", "parts")
+PARTS = ("layers", "parts")
 _NAME = re.compile(r"[\w-]+")
 MOST_SAMPLES = 4096
 MOST_BLEED = 4096
@@ -152,6 +153,8 @@ class OutputSpec(Model):
     """OpenEXR compression."""
     stereo: Annotated[str, OneOf(STEREO)] = "files"
     """Two eyes' images: files of their own, or parts of one file."""
+    parts: Annotated[str, OneOf(PARTS)] = "layers"
+    """Channels of an image: layers of one part, or a part of the file each."""
     unlit: Annotated[str, OneOf(UNLIT)] = "write"
     """Images of facets that face away from the viewer: written, hard links to one of their size, or none."""
     data_window: Annotated[str, OneOf(DATA_WINDOWS)] = "full"
@@ -162,6 +165,10 @@ class OutputSpec(Model):
         if not (self.quilts or self.facets):
             yield (), "nothing to write (expected quilts or facets to be true)"
         yield from _twice(self.channels)
+        mattes = [name for name in self.channels if CHANNELS[name].matte]
+        if mattes and self.compression not in LOSSLESS:
+            words = f"{self.compression} alters the identities in {mattes[0]} (expected {either(LOSSLESS)})"
+            yield ("compression",), words
 
 
 def _twice(channels: Sequence[str]) -> Iterator[Complaint]:
@@ -218,6 +225,10 @@ class JobFile(FileModel):
         if self.render.clip == "distance" and "zv" in self.output.channels:
             words = "zv lies between a near and a far plane (expected planar or auto), got distance"
             yield ("render", "clip"), words
+        for index, name in enumerate(self.output.channels):
+            if self.render.method == "twopass" and (CHANNELS[name].matte or name == "motion"):
+                words = f"{name} cannot be resampled, which method: twopass does (expected another method)"
+                yield ("output", "channels", index), words
 
     kind: ClassVar[str] = "quilt_job"
 

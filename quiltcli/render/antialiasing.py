@@ -16,12 +16,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from quiltcli.channels import CHANNELS, MOST_HALF
-from quiltcli.geometry import Float32Array, FloatArray
+from quiltcli.geometry import FloatArray
 from quiltcli.layout import Layout
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.setup import Stage
-from quiltcli.shading.aovs import light_at_points, shaded_for, wanted_for
+from quiltcli.render.sums import Sums, new_sums
+from quiltcli.shading.aovs import shaded_for, wanted_for
 from quiltcli.visibility.draw import Frame, draw
 
 _TURN = 1e-6  # by which a map's linear part may be off a whole turn
@@ -50,11 +50,6 @@ _LATTICES = {
 }
 
 
-def averaged(channels: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of the channels that are light, whose samples are averaged."""
-    return tuple(name for name in channels if CHANNELS[name].averaged)
-
-
 def draw_samples(
     stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, channels: tuple[str, ...]
 ) -> None:
@@ -65,53 +60,28 @@ def draw_samples(
         frame: the frame.
         batch: the range of blocks.
         buffers: written to, at every pixel that any sample sees.
-        channels: some of `averaged`.
+        channels: some of `sums.summed`.
     """
-    sums = _Sums(stage, batch, channels)
-    scene, eye = stage.scene, frame.viewer.eye
-    count = stage.job.render.samples
+    first, size = _addresses(stage, batch)
+    sums = Sums(new_sums(channels, lambda dtype: np.zeros(size, dtype)), channels, first)
+    scene, count = stage.scene, stage.job.render.samples
     for sample in sample_places(count):
         drawing = draw(frame, batch, in_quilt(stage.layout, sample))
-        for shaded in shaded_for(channels, drawing, wanted_for(channels, scene), scene, eye):
-            pixel = shaded.hits.pixel - sums.first
-            sums.hits[pixel] += 1
-            for name in channels:
-                for values, total in zip(light_at_points(name, shaded), sums.light[name], strict=True):
-                    total[pixel] += shaded.hits.drawn(np.minimum(values, MOST_HALF))
+        for shaded in shaded_for(channels, drawing, wanted_for(channels, scene), scene, frame.viewer.eye):
+            sums.add(shaded)
         drawing.done()
     sums.store(buffers, count, scene.background)
 
 
-class _Sums:
-    """Sums over the samples of a batch's pixels, from the first to the last address that is a pixel of it.
+def _addresses(stage: Stage, batch: tuple[int, int]) -> tuple[int, int]:
+    """The first address of a batch's pixels, and how many there are up to the last.
 
     Addresses between that belong to other batches are memory that is never touched, and costs nothing.
     """
-
-    def __init__(self, stage: Stage, batch: tuple[int, int], channels: tuple[str, ...]) -> None:
-        blocks, block = stage.blocks, np.arange(*batch)
-        ends = blocks.address[block] + (blocks.height[block] - 1) * blocks.stride[block] + blocks.width[block]
-        self.first = int(blocks.address[block].min())
-        size = int(ends.max()) - self.first
-        self.hits = np.zeros(size, dtype=np.uint16)
-        self.light = {name: [np.zeros(size, dtype=np.float32) for _ in range(3)] for name in channels}
-
-    def store(self, buffers: Buffers, count: int, background: Float32Array) -> None:
-        """Write the means into the pixels of which any sample sees something."""
-        pixel = np.flatnonzero(self.hits)
-        seen = self.hits[pixel].astype(np.float32)
-        for name, totals in self.light.items():
-            layers = CHANNELS[name].layers
-            for k, (layer, total) in enumerate(zip(layers, totals, strict=False)):
-                values = total[pixel]
-                if name == "rgba":
-                    values += (count - seen) * background[k]
-                self._put(buffers, layer, pixel, values / np.float32(count))
-            if name == "rgba":
-                self._put(buffers, "A", pixel, seen / np.float32(count))
-
-    def _put(self, buffers: Buffers, layer: str, pixel: np.ndarray, values: Float32Array) -> None:
-        buffers[layer][pixel + self.first] = np.minimum(values, MOST_HALF).astype(np.float16)
+    blocks, block = stage.blocks, np.arange(*batch)
+    ends = blocks.address[block] + (blocks.height[block] - 1) * blocks.stride[block] + blocks.width[block]
+    first = int(blocks.address[block].min())
+    return first, int(ends.max()) - first
 
 
 def in_quilt(layout: Layout, sample: tuple[float, float]) -> FloatArray:

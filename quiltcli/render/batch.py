@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from quiltcli.geometry import BoolArray
-from quiltcli.render.antialiasing import averaged, draw_samples
+from quiltcli.projection.gaze import Gaze
+from quiltcli.render.antialiasing import draw_samples
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
+from quiltcli.render.sums import summed
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
@@ -45,7 +47,7 @@ def draw_batch(
     block = np.arange(*batch)
     lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers)
     channels = stage.job.output.channels
-    light = averaged(channels) if stage.job.render.samples > 1 else ()
+    light = summed(channels) if stage.job.render.samples > 1 else ()
     if light:
         draw_samples(stage, frame, batch, buffers, light)
         channels = tuple(name for name in channels if name not in light)
@@ -53,9 +55,9 @@ def draw_batch(
     if frame.order is not None:
         wanted |= Wanted.POSITION
     visible, first = 0, stage.blocks.tiles(batch).start
-    drawing = draw(frame, batch)
+    drawing, gaze = draw(frame, batch), Gaze(frame.viewer, frame.rays)
     for shaded in shaded_for(channels, drawing, wanted, stage.scene, frame.viewer.eye):
-        fill(buffers, channels, frame.viewer, shaded)
+        fill(buffers, channels, gaze, shaded)
         if frame.order is not None:
             fill_stored(buffers, frame.order, shaded.hits)
         visible += shaded.hits.inside

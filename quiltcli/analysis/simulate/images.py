@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.analysis.simulate.lookup import Shown
-from quiltcli.formats.exr.image import read_exr
 from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.images.facets import page_of, quilt_buffers
+from quiltcli.images.layers import read_view
 from quiltcli.images.metadata import is_complete
 from quiltcli.images.names import facet_path, quilt_path
 from quiltcli.images.window import whole_frame
@@ -60,7 +60,7 @@ def _quilts(stage: Stage, view: View, folder: Path, job_sha: str) -> Buffers | N
         return None
     buffers = {name: np.zeros(stage.owners.size, dtype=np.float16) for name in "RGB"}
     for page, path in enumerate(paths):
-        channels = whole_frame(read_exr(path, view.part))
+        channels = whole_frame(read_view(path, view.part))
         if any(name not in channels for name in "RGB"):
             return None
         for name, flat in buffers.items():
@@ -76,7 +76,7 @@ def _facets(stage: Stage, lit: BoolArray, view: View, folder: Path, job_sha: str
         return None
     images = {}
     for row, path in paths.items():
-        channels = whole_frame(read_exr(path, view.part))
+        channels = whole_frame(read_view(path, view.part))
         if any(name not in channels for name in "RGB"):
             return None
         images[row] = {name: channels[name] for name in "RGB"}

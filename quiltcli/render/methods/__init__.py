@@ -17,12 +17,13 @@ from quiltcli.render.crew import Crew
 from quiltcli.render.frame import draw_frame as rasterize_frame
 from quiltcli.render.methods.raycast import cast_frame
 from quiltcli.render.methods.twopass import draw_twice
+from quiltcli.render.moments import Moment
 from quiltcli.render.report import FrameRecord, together
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.view import View
 from quiltcli.viewer.viewer import Viewer
 
-__all__ = ["OTHERS", "draw_frame", "draw_view"]
+__all__ = ["OTHERS", "draw_frame", "draw_moment", "draw_view"]
 
 OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], FrameRecord]] = {
     "twopass": draw_twice,
@@ -64,6 +65,20 @@ def draw_view(
         for viewer, theirs in facets_by_viewer(view, stage.facets.count, only)
     ]
     return replace(together(records), eye=view.eye)
+
+
+def draw_moment(
+    moment: Moment,
+    buffers: Buffers,
+    threads: int = 1,
+    only: BoolArray | None = None,
+    *,
+    dirty: BoolArray | None = None,
+    crew: Crew | None = None,
+) -> FrameRecord:
+    """Draw a view as it is at its time. Arguments as for `draw_frame`."""
+    record = draw_view(moment.stage, moment.view, buffers, threads, only, dirty=dirty, crew=crew)
+    return replace(record, warnings=(*record.warnings, *moment.warnings))
 
 
 def facets_by_viewer(
