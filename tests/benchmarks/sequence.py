@@ -15,8 +15,8 @@ from typing import Any
 
 from quiltcli.job import load_job
 from quiltcli.render.buffers import new_buffers
-from quiltcli.render.frame import draw_frame
-from quiltcli.render.outputs import write_frame
+from quiltcli.render.methods import draw_view
+from quiltcli.render.outputs import Drawn, write_views
 from quiltcli.render.sequence import Listener, Prepared, RenderOptions, prepare, render_frames
 from tests.benchmarks.meshes import Mesh
 from tests.benchmarks.race import children
@@ -99,16 +99,16 @@ def main(job: Path) -> None:
 
 def _writing_alone(ready: Prepared) -> float:
     """Seconds to write as many frames as the job has, from finished buffers, with nothing beside it."""
-    stage, viewers = ready.stage, ready.viewers
+    stage, views = ready.stage, ready.views
     buffers = new_buffers(stage)
-    chosen = viewers[:: max(len(viewers) // _SAMPLES, 1)]
+    chosen = views[:: max(len(views) // _SAMPLES, 1)]
     total = 0.0
-    for viewer in chosen:
-        draw_frame(stage, viewer, buffers, 2)
+    for view in chosen:
+        draw_view(stage, view, buffers, 2)
         start = time.perf_counter()
-        write_frame(stage, ready.out, viewer, buffers, 2)
+        write_views(stage, ready.out, [Drawn(view, buffers)], 2)
         total += time.perf_counter() - start
-    return total * len(viewers) / len(chosen)
+    return total * len(views) / len(chosen)
 
 
 if __name__ == "__main__":
