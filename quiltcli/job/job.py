@@ -22,6 +22,7 @@ from quiltcli.job.model import (
     Model,
     OneOf,
     ScenePath,
+    Unit,
     YamlPath,
     complaint,
     describe,
@@ -39,6 +40,7 @@ STEREO = ("files", "parts")
 PARTS = ("layers", "parts")
 _NAME = re.compile(r"[\w-]+")
 MOST_SAMPLES = 4096
+MOST_TIMES = 256
 MOST_BLEED = 4096
 UNLIT = ("write", "link", "skip")
 DATA_WINDOWS = ("full", "tight")
@@ -104,6 +106,10 @@ class RenderSpec(Model):
 
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
+    shutter: Unit = 0.0
+    """How long the shutter is open from the frame's time on, as a share of a frame: motion blur."""
+    motion_samples: Annotated[int, Field(ge=1, le=MOST_TIMES)] = 16
+    """Times at most at which the samples of a pixel look while the shutter is open."""
     method: Annotated[str, OneOf(METHODS)] = "homography"
     """Render method."""
     depth_bits: Annotated[
@@ -120,6 +126,11 @@ class RenderSpec(Model):
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
 
+    @property
+    def averages(self) -> bool:
+        """Whether light is the mean of samples, and not that of the pixel's centre at the frame's time."""
+        return self.samples > 1 or self.shutter > 0
+
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
         return "zv" in channels or self.depth_bits is not None or self.method not in ("homography", "raycast")
@@ -133,6 +144,8 @@ class RenderSpec(Model):
             yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
+        if self.method in ("raycast", "twopass") and self.shutter:
+            yield ("shutter",), f"expected 0 beside method: {self.method}, got {self.shutter:g}"
 
 
 class OutputSpec(Model):

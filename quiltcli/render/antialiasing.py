@@ -12,6 +12,7 @@ ids and other data are those of the pixel's centre.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -64,13 +65,29 @@ def draw_samples(
     """
     first, size = _addresses(stage, batch)
     sums = Sums(new_sums(channels, lambda dtype: np.zeros(size, dtype)), channels, first)
-    scene, count = stage.scene, stage.job.render.samples
-    for sample in sample_places(count):
-        drawing = draw(frame, batch, in_quilt(stage.layout, sample))
-        for shaded in shaded_for(channels, drawing, wanted_for(channels, scene), scene, frame.viewer.eye):
+    count = stage.job.render.samples
+    add_samples(stage, frame, batch, sums, sample_places(count))
+    sums.store(buffers, count, stage.scene.background)
+
+
+def add_samples(
+    stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums, places: Sequence[tuple[float, float]]
+) -> None:
+    """Add samples of a batch to sums.
+
+    Args:
+        stage: what the job's frames share.
+        frame: the frame.
+        batch: the range of blocks.
+        sums: added to.
+        places: the samples' places in a pixel, from its centre.
+    """
+    scene, wanted = stage.scene, wanted_for(sums.channels, stage.scene)
+    for place in places:
+        drawing = draw(frame, batch, in_quilt(stage.layout, place))
+        for shaded in shaded_for(sums.channels, drawing, wanted, scene, frame.viewer.eye):
             sums.add(shaded)
         drawing.done()
-    sums.store(buffers, count, scene.background)
 
 
 def _addresses(stage: Stage, batch: tuple[int, int]) -> tuple[int, int]:
@@ -103,6 +120,37 @@ def sample_places(samples: int) -> tuple[tuple[float, float], ...]:
     return tuple(
         ((i + 0.5) / samples - 0.5, (i * step % samples + 0.5) / samples - 0.5) for i in range(samples)
     )
+
+
+@lru_cache(maxsize=8)
+def sample_times(samples: int, most: int) -> tuple[tuple[float, tuple[tuple[float, float], ...]], ...]:
+    """The samples by the times at which they look, as shares of an exposure, ascending.
+
+    Sample i looks at ((i·b mod N) + ½)/N, the third coordinate of a rank-1 lattice; with more samples than
+    `most` times, at the middle of the share of the exposure in which that lies.
+    """
+    places, step = sample_places(samples), time_step(samples)
+    count = min(samples, most)
+    groups: list[list[tuple[float, float]]] = [[] for _ in range(count)]
+    for i, place in enumerate(places):
+        groups[(2 * (i * step % samples) + 1) * count // (2 * samples)].append(place)
+    return tuple(((k + 0.5) / count, tuple(group)) for k, group in enumerate(groups))
+
+
+def time_step(samples: int) -> int:
+    """The step `b` of times with which the nearest points of place and time are farthest apart."""
+    step = _LATTICES.get(samples) or best_step(samples)
+    i = np.arange(1, samples)
+    across = np.minimum(i, samples - i) ** 2
+    down = i * step % samples
+    across += np.minimum(down, samples - down) ** 2
+
+    def nearest(b: int) -> int:
+        late = i * b % samples
+        return int((across + np.minimum(late, samples - late) ** 2).min(initial=samples**2))
+
+    coprime = [b for b in range(1, samples + 1) if np.gcd(b, samples) == 1]
+    return max(coprime, key=lambda b: (nearest(b), -b))
 
 
 def best_step(samples: int) -> int:

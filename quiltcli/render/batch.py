@@ -31,7 +31,13 @@ class Drawn:
 
 
 def draw_batch(
-    stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, stale: BoolArray
+    stage: Stage,
+    frame: Frame,
+    batch: tuple[int, int],
+    buffers: Buffers,
+    stale: BoolArray,
+    *,
+    exposed: bool = False,
 ) -> Drawn:
     """Draw one batch into the buffers; its pixels belong to no other batch.
 
@@ -42,14 +48,16 @@ def draw_batch(
         buffers: written to.
         stale: (m,) microtiles of these blocks that still hold another frame and have to be emptied where
             nothing is seen.
+        exposed: whether what is made of samples is left to exposures, which are drawn by themselves.
     """
     frame = ordered(stage, frame)
     block = np.arange(*batch)
     lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers)
     channels = stage.job.output.channels
-    light = summed(channels) if stage.job.render.samples > 1 else ()
+    light = summed(channels) if exposed or stage.job.render.samples > 1 else ()
     if light:
-        draw_samples(stage, frame, batch, buffers, light)
+        if not exposed:
+            draw_samples(stage, frame, batch, buffers, light)
         channels = tuple(name for name in channels if name not in light)
     wanted = wanted_for(channels, stage.scene)
     if frame.order is not None:

@@ -42,13 +42,19 @@ class Sums:
     """Sums over the samples of the pixels from one address on."""
 
     def __init__(self, memory: Mapping[str, NDArray[Any]], channels: tuple[str, ...], first: int = 0) -> None:
-        self._memory, self._channels, self._first = memory, channels, first
+        self.channels = channels
+        self._memory, self._first = memory, first
+
+    @property
+    def size(self) -> int:
+        """How many addresses there are."""
+        return int(self._memory["cover"].size)
 
     def add(self, shaded: Shaded) -> None:
         """Add what is seen at one sample of some pixels, each of them once."""
         pixel = shaded.hits.pixel - self._first
         self._memory["cover"][pixel] += 1
-        for name in self._channels:
+        for name in self.channels:
             if CHANNELS[name].matte:
                 identity = identities_of(shaded.scene, name, shaded.hits.triangle)
                 self._note(name, pixel, shaded.hits.drawn(identity[:, None]))
@@ -79,13 +85,19 @@ class Sums:
             background: (3,) what the other samples see.
             part: the only pixels that are looked at, from the first address on; None for all.
         """
-        part = part or slice(0, self._memory["cover"].size)
+        part = part or slice(0, self.size)
         pixel = np.flatnonzero(self._memory["cover"][part]) + part.start
-        for name in self._channels:
+        for name in self.channels:
             if CHANNELS[name].matte:
                 self._store_matte(buffers, name, pixel, count)
             else:
                 self._store_light(buffers, name, pixel, count, background)
+
+    def clear(self, part: slice) -> None:
+        """Make some of the sums 0, from the first address on."""
+        pixel = np.flatnonzero(self._memory["cover"][part]) + part.start
+        for values in self._memory.values():
+            values[pixel] = 0
 
     def _store_light(
         self, buffers: Buffers, name: str, pixel: IntArray, count: int, background: Float32Array

@@ -15,7 +15,8 @@ from quiltcli.images.names import facet_path, quilt_path
 from quiltcli.images.window import whole_frame
 from quiltcli.layout import pixel_owners
 from quiltcli.render.buffers import Buffers, new_buffers
-from quiltcli.render.methods import draw_view
+from quiltcli.render.methods import draw_moment
+from quiltcli.render.moments import moment
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import View
@@ -49,7 +50,7 @@ def shown_images(
         owners = pixel_owners(stage.layout)  # a facet's image ends at its polygon
     else:
         buffers, source = new_buffers(stage), "drawn for this picture"
-        draw_view(stage, view, buffers, threads)
+        draw_moment(moment(stage, view), buffers, threads)
     return Shown(stage.facets, stage.layout, lit, buffers, owners, viewer.eye), source
 
 
