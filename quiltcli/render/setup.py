@@ -12,7 +12,7 @@ import numpy as np
 from quiltcli.display import Facets, load_display
 from quiltcli.errors import JobError, SceneError, raise_all
 from quiltcli.geometry import OwnerArray
-from quiltcli.images.names import layout_path
+from quiltcli.images.names import Names, layout_path, names_of, names_problems
 from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
@@ -57,6 +57,11 @@ class Stage:
         """What near and far cut in all frames, `planar` or `distance`."""
         return settled_clip(self.job, self.facets)
 
+    @cached_property
+    def names(self) -> Names:
+        """How the images are called."""
+        return names_of(self.job, self.facets.names)
+
     def views(self, frames: Iterable[int]) -> list[View]:
         """The views of some frames.
 
@@ -88,6 +93,7 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     facets = load_display(load_display_file(job.display))
     raise_all(JobError, facet_problems(job, facets.count))
     layout = layout_for(job.layout or PackSpec(), facets, kept)
+    raise_all(JobError, names_problems(job, len(layout.pages), facets.count))
     demand_memory(job, layout)
     scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))
     return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)
