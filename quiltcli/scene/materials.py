@@ -10,7 +10,7 @@ import numpy as np
 
 from quiltcli.geometry import Float32Array
 from quiltcli.job.model import FARTHEST
-from quiltcli.scene.scene import Materials
+from quiltcli.scene.scene import ALPHAS, Materials
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,10 @@ class Surface:
         unlit: shows exactly `color`.
         specular: 0 to 1, strength of the layer that reflects; metals reflect all the same.
         textures: images that vary it.
+        opacity: alpha, 0 to 1.
+        alpha: what that means: `opaque`, `mask` or `blend`.
+        cutoff: the least alpha that `mask` shows.
+        double_sided: whether its back is seen, too, in jobs that ask the files.
     """
 
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)
@@ -59,10 +63,16 @@ class Surface:
     unlit: bool = False
     specular: float = 1.0
     textures: tuple[Texture, ...] = ()
+    opacity: float = 1.0
+    alpha: str = "opaque"
+    cutoff: float = 0.5
+    double_sided: bool = True
 
     def overridden(self, given: Mapping[str, Any]) -> Surface:
         """This surface with the keys of `given` in place of its own, without images that vary those."""
         changes: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
+        if "opacity" in changes and "alpha" not in changes and self.alpha == "opaque":
+            changes["alpha"] = "blend"
         changes.setdefault("textures", tuple(t for t in self.textures if t.role not in changes))
         return replace(self, **changes)
 
@@ -77,6 +87,10 @@ def material_table(surfaces: Sequence[Surface]) -> Materials:
         unlit=np.array([s.unlit for s in surfaces], dtype=np.bool_),
         specular=_plausible([s.specular for s in surfaces], 1.0),
         textures=tuple(s.textures for s in surfaces),
+        opacity=_plausible([s.opacity for s in surfaces], 1.0),
+        alpha=np.array([ALPHAS.index(s.alpha) for s in surfaces], dtype=np.int32),
+        cutoff=_plausible([s.cutoff for s in surfaces]),
+        one_sided=np.array([not s.double_sided for s in surfaces], dtype=np.bool_),
     )
 
 
