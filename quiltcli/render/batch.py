@@ -8,11 +8,13 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray
 from quiltcli.projection.gaze import Gaze
-from quiltcli.render.antialiasing import draw_samples
+from quiltcli.render.antialiasing import draw_samples, new_batch_sums
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
 from quiltcli.render.sums import summed
+from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
+from quiltcli.shading.layers import layers
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
 
@@ -71,10 +73,43 @@ def draw_batch(
         visible += shaded.hits.inside
     if stale.any():
         empty_missed(stage, drawing, stale, first, buffers)
+    if drawing.soft is not None:
+        visible += draw_layers(stage, drawing, batch, buffers, channels, wanted, gaze, frame.order)
     tiles = np.full(stale.size, not mends_itself(stage))
     tiles[drawing.drawn() - first] = True
     drawing.done()
     return Drawn(visible, tiles)
+
+
+def draw_layers(
+    stage: Stage,
+    drawing: Drawing,
+    batch: tuple[int, int],
+    buffers: Buffers,
+    channels: tuple[str, ...],
+    wanted: Wanted,
+    gaze: Gaze,
+    order: DepthOrder | None,
+) -> int:
+    """Write `channels` at the pixels that are seen through something; how many inside facets show the scene.
+
+    Light goes through all layers; other channels are those of the first that holds up any.
+    """
+    light = summed(channels)
+    data = tuple(name for name in channels if name not in light)
+    sums, visible = new_batch_sums(stage, batch, light), 0
+    for layer in layers(drawing, wanted, stage.scene, gaze.viewer.eye):
+        if light:
+            sums.add(layer.shaded, layer.weight)
+        if layer.first.any():
+            visible += int(np.count_nonzero(layer.first & layer.inside))
+            mine = layer.shaded.hits.some(np.flatnonzero(layer.first))
+            fill(buffers, data, gaze, Shaded(stage.scene, gaze.viewer.eye, mine))
+            if order is not None:
+                fill_stored(buffers, order, mine)
+    if light:
+        sums.store(buffers, 1, stage.scene.background)
+    return visible
 
 
 def empty_missed(stage: Stage, drawing: Drawing, stale: BoolArray, first: int, buffers: Buffers) -> None:

@@ -82,9 +82,10 @@ def albedo_wants(scene: Scene) -> Wanted:
 
 
 def alpha_at(scene: Scene, seen: Points) -> Values:
-    """Alpha of the base colour's textures at points, straight as files have it; 1 where there is none."""
-    texels = texels_at(scene, seen, "color", ALPHA)
-    return np.float32(1) if texels is None else texels[0]
+    """Alpha of textures at points, straight as files have it; 1 where there is none."""
+    texels, own = texels_at(scene, seen, "color", ALPHA), value_at(scene, seen, "opacity")
+    alpha: Values = np.float32(1) if texels is None else texels[0]
+    return alpha if own is None else alpha * own
 
 
 def emission_at(scene: Scene, seen: Points) -> Colors:

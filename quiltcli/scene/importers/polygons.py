@@ -124,6 +124,8 @@ def surface_of(material: MeshMaterial | None, *, colored: bool) -> Surface:
         "roughness": material.roughness,
         "metallic": material.metallic,
     }
+    if material.opacity is not None and material.opacity < 1:
+        keys |= {"opacity": min(max(material.opacity, 0.0), 1.0), "alpha": "blend"}
     if material.shininess is not None and material.roughness is None:
         # Blinn's exponent to GGX's alpha, 2/(Ns + 2) = alpha², alpha = roughness².
         keys["roughness"] = (2 / (max(material.shininess, 0.0) + 2)) ** 0.25
@@ -132,6 +134,8 @@ def surface_of(material: MeshMaterial | None, *, colored: bool) -> Surface:
     for texture in textures:
         if texture.role in _OF_PICTURES and not np.any(getattr(material, texture.role) or 0):
             keys[texture.role] = _OF_PICTURES[texture.role]
+        if texture.role == "opacity":
+            keys.setdefault("alpha", "blend")
     return surface.overridden({k: v for k, v in keys.items() if v is not None} | {"textures": textures})
 
 
