@@ -65,7 +65,11 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/reduce.py $(DOCS)/wall-*.png $(DOCS)/cave-lab.png
 	$(PY) -m tests.benchmarks.halftones --write docs/halftones.md --picture $(DOCS)/halftones.png
 	$(PY) docs/pictures/lightfield.py $(DOCS)/lightfield.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
+	$(QUILT) render scenes/demo.yaml -f 3 --overwrite --set output.channels='[rgba,Z,motion,cryptoobject]' --set render.samples=16
+	$(PY) docs/pictures/channels.py out/demo/facets/facet_0001.0003.exr -o $(DOCS)/channels.png
+	$(PY) docs/pictures/motion_blur.py -o $(DOCS)/motion-blur.png
+	$(PY) docs/pictures/transparency.py -o $(DOCS)/transparency.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2

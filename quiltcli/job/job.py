@@ -35,6 +35,7 @@ from quiltcli.job.model import (
     OneOf,
     Positive,
     ScenePath,
+    Unit,
     YamlPath,
     complaint,
     describe,
@@ -52,8 +53,11 @@ LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
 COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
 CLIPS = ("auto", "planar", "distance")
 STEREO = ("files", "parts")
+SIDES = ("all", "file")
+PARTS = ("layers", "parts")
 _NAME = re.compile(r"[\w-]+")
 MOST_SAMPLES = 4096
+MOST_TIMES = 256
 MOST_BLEED = 4096
 MOST_PLACES = 64
 UNLIT = ("write", "link", "skip")
@@ -135,6 +139,10 @@ class RenderSpec(Model):
 
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
+    shutter: Unit = 0.0
+    """How long the shutter is open from the frame's time on, as a share of a frame: motion blur."""
+    motion_samples: Annotated[int, Field(ge=1, le=MOST_TIMES)] = 16
+    """Times at most at which the samples of a pixel look while the shutter is open."""
     method: Annotated[str, OneOf((*METHODS, "exact", "vertex"))] = "homography"
     """Render method; on a 360° light field display exact (so where the key is absent), raycast or vertex."""
     tessellate: Positive | None = None
@@ -152,6 +160,8 @@ class RenderSpec(Model):
     """Drop triangles that face away from the viewer."""
     faces: Annotated[int, Field(ge=1, le=16384)] | None = None
     """Width and height of the faces that method: cubemap looks pixels up in, 2048 when absent, pixels."""
+    double_sided: Annotated[str, OneOf(SIDES)] = "all"
+    """Surfaces whose backs are seen: all, or those that their files call so (file)."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
     anisotropy: Annotated[int, Field(ge=1, le=MOST_PLACES)] = 16
@@ -168,6 +178,11 @@ class RenderSpec(Model):
         WithJsonSchema({"type": ["number", "string"], "examples": [0.5, "1/4"]}),
     ] = Fraction(1)
     """Share of the display's pixels across and down, for proxies: 1/4; its layout is packed anew."""
+
+    @property
+    def averages(self) -> bool:
+        """Whether light is the mean of samples, and not that of the pixel's centre at the frame's time."""
+        return self.samples > 1 or self.shutter > 0
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
@@ -189,6 +204,8 @@ class RenderSpec(Model):
             yield ("depth_bits",), "a cube map has exact depth (expected no such key beside method: cubemap)"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
+        if self.method in ("raycast", "twopass") and self.shutter:
+            yield ("shutter",), f"expected 0 beside method: {self.method}, got {self.shutter:g}"
 
 
 class OutputSpec(Model):
@@ -213,6 +230,8 @@ class OutputSpec(Model):
     """OpenEXR compression."""
     stereo: Annotated[str, OneOf(STEREO)] = "files"
     """Two eyes' images: files of their own, or parts of one file."""
+    parts: Annotated[str, OneOf(PARTS)] = "layers"
+    """Channels of an image: layers of one part, or a part of the file each."""
     unlit: Annotated[str, OneOf(UNLIT)] = "write"
     """Images of facets that face away from the viewer: written, hard links to one of their size, or none."""
     data_window: Annotated[str, OneOf(DATA_WINDOWS)] = "full"
@@ -225,6 +244,10 @@ class OutputSpec(Model):
         if not (self.quilts or self.facets):
             yield (), "nothing to write (expected quilts or facets to be true)"
         yield from _twice(self.channels)
+        mattes = [name for name in self.channels if CHANNELS[name].matte]
+        if mattes and self.compression not in LOSSLESS:
+            words = f"{self.compression} alters the identities in {mattes[0]} (expected {either(LOSSLESS)})"
+            yield ("compression",), words
 
 
 def _twice(channels: Sequence[str]) -> Iterator[Complaint]:
@@ -295,6 +318,10 @@ class JobFile(FileModel):
         if self.render.clip == "distance" and "zv" in self.output.channels:
             words = "zv lies between a near and a far plane (expected planar or auto), got distance"
             yield ("render", "clip"), words
+        for index, name in enumerate(self.output.channels):
+            if self.render.method == "twopass" and (CHANNELS[name].matte or name == "motion"):
+                words = f"{name} cannot be resampled, which method: twopass does (expected another method)"
+                yield ("output", "channels", index), words
 
     def _ring_checks(self) -> Iterator[Complaint]:
         """What belongs to a ring of viewers alone, and what does not go with it."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.display import Facets, load_display, scaled
-from quiltcli.errors import JobError, SceneError, raise_all
+from quiltcli.errors import JobError, Problem, SceneError, raise_all
 from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.images.names import Names, layout_path, names_of, names_problems
 from quiltcli.job import JobFile, PackSpec, UvLayoutSpec, load_display_file, load_scene_file
@@ -109,6 +109,9 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     demand_memory(job, layout)
     store = TextureStore(texture_limits(job))
     scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps), store)
+    if facets.charts and scene.soft is not None:
+        words = "has surfaces that light passes, which curved facets do not show yet (expected opaque ones)"
+        raise SceneError(Problem(words, file=str(job.scene)))
     return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)
 
 

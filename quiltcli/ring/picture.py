@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from quiltcli.channels import CHANNELS, MOST_HALF, empty_buffers
 from quiltcli.geometry import BoolArray, IntArray, slices
 from quiltcli.lightfield import Field
+from quiltcli.projection.gaze import Gaze
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.hits import EYE, ring_hits
 from quiltcli.ring.outline import lit_pixels
@@ -176,7 +177,7 @@ def _centres(
     seen, address, counts = _look(show, pose, lit, (0.0, 0.0))
     start = time.perf_counter()
     for part in slices(0, seen.pixel.size, _CHUNK):
-        fill(buffers, channels, show.viewer, _shaded(show, pose, seen, address, part))
+        fill(buffers, channels, Gaze(show.viewer, None), _shaded(show, pose, seen, address, part))
     counts.seconds["shade"] = time.perf_counter() - start
     return counts
 

@@ -20,7 +20,7 @@ BARE = {
     *("quilt_display", "quilt_job", "quilt_layout", "quilt_scene", "quilt_lightfield", "quilt_calibration"),
     *("views", "first_view", "first_row", "count"),
     *("id", "page", "max_pages", "page_facets", "samples"),
-    *("aspect", "metallic", "roughness", "specular", "scale", "matrix", "facets"),
+    *("aspect", "metallic", "roughness", "specular", "opacity", "cutoff", "scale", "matrix", "facets"),
     *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces"),
     *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),
     *("uv_set", "offset", "strength"),

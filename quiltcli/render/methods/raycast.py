@@ -17,6 +17,7 @@ import numpy as np
 
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
+from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background
 from quiltcli.render.notices import frame_warnings
@@ -51,7 +52,8 @@ def cast_frame(
     if only is not None:
         lit &= only
     rays = viewer_rays(stage.layout, stage.facets, lit, viewer)
-    target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
+    gaze = Gaze(viewer, rays)
+    target = target_of(stage, viewer)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     sloped = stage.scene.textures is not None
     clear(stage, buffers, only)
@@ -62,7 +64,7 @@ def cast_frame(
         pixels = places(address, stage.layout, stage.owners, rays)
         hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals, sloped=sloped)
         if hits.triangle.size:
-            fill(buffers, stage.job.output.channels, viewer, Shaded(stage.scene, viewer.eye, hits))
+            fill(buffers, stage.job.output.channels, gaze, Shaded(stage.scene, viewer.eye, hits))
         return hits.inside
 
     with ThreadPoolExecutor(threads) as pool:
@@ -79,6 +81,23 @@ def cast_frame(
         fill=stage.fill,
         seconds={"cast and shade": time.perf_counter() - begin},
         warnings=tuple(frame_warnings(stage, viewer, lit, pairs=1, visible=visible)),
+    )
+
+
+def target_of(stage: Stage, viewer: Viewer) -> Target:
+    """The stage's scene as rays of a viewer meet it.
+
+    Raises:
+        MissingExtraError: there is no Embree on this machine.
+    """
+    scene, how = stage.scene, stage.job.render
+    return aim(
+        scene.vertices,
+        scene.triangles,
+        viewer,
+        how.backface_culling,
+        one_sided=scene.one_sided if how.double_sided == "file" else None,
+        invisible=scene.invisible,
     )
 
 

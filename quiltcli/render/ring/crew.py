@@ -18,6 +18,7 @@ from typing import Any
 
 from quiltcli.ending import SIGNALS
 from quiltcli.errors import CheckFailedError, Problem, QuiltError
+from quiltcli.formats.exr.image import use_threads
 from quiltcli.render.workers import can_fork
 
 
@@ -47,6 +48,7 @@ def shared_out(
             check()
             yield item, work(item)
         return
+    use_threads(0)  # a process that is forked beside OpenEXR's threads waits for them for ever
     context = multiprocessing.get_context("fork")
     lines: list[Any] = []
     crew: list[Any] = []

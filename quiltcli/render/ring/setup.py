@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from quiltcli.errors import Problem, SceneError, ViewerError, raise_all
+from quiltcli.errors import JobError, Problem, SceneError, ViewerError, raise_all
 from quiltcli.job import JobFile, load_lightfield_file, load_scene_file
 from quiltcli.job.halftone import HalftoneSpec
 from quiltcli.job.load import load_mirror_file
@@ -116,6 +116,10 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
     raise_all(SceneError, source.problems(frames) if source else ())
     compensate = job.halftone is not None and job.halftone.compensate == "dwell"
     shortest = shortest_dwell(rig) if compensate else 1.0
+    raise_all(JobError, _foreign(job))
+    if scene.soft is not None:
+        words = "has surfaces that light passes, which a 360° light field display does not show yet"
+        raise SceneError(Problem(words, file=str(job.scene)))
     stage = RingStage(job, display, job.ring, rig, scene, source, shortest, photographs)
     problems: list[Problem] = []
     for frame in frames if job.ring.heads is not None else frames[:1]:
@@ -127,6 +131,15 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
     if frames:
         stage.show(frames[0])
     return stage
+
+
+def _foreign(job: JobFile) -> Iterator[Problem]:
+    """Problems with channels of facets that a mirror does not have."""
+    for name in ("motion", "cryptoobject", "cryptomaterial"):
+        if name in job.output.channels:
+            yield job.output.source.problem(
+                ("channels",), f"{name} is a channel of facets (expected no such channel beside ring)"
+            )
 
 
 def with_mesh(show: Show, mesh: Mesh) -> Show:

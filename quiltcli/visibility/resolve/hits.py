@@ -150,6 +150,21 @@ class Hits:
         """Quilt addresses (P,)."""
         return self.places.pixel
 
+    def some(self, rows: IntArray) -> Hits:
+        """Some (n,) of hits that are single pixels, each a group of its own; how many are inside is lost."""
+        return Hits(
+            places=single_places(self.places.single[rows]),
+            chosen=None,
+            facet=self.facet[rows],
+            triangle=self.triangle[rows],
+            ray=self.ray[rows],
+            depth=self.depth[rows],
+            normal=None if self.normal is None else self.normal[rows],
+            weights=None if self.weights is None else self.weights[:, rows],
+            position=None if self.position is None else self.position[:, rows],
+            inside=0,
+        )
+
     def drawn(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values (P,) of the drawn pixels, of values (G, k), (G, 1) for whole groups, or (1, 1) for all."""
         k = self.depth.shape[1]

@@ -140,7 +140,7 @@ def _draw_rounds(
             # No microtile twice: reading, comparing and writing back loses nothing.
             few = spans[part]
             keys = canvas.keys.take(few.tile, axis=0)
-            canvas.keys[few.tile] = np.maximum(keys, _tile_keys(planes, few, limits, bits, by), out=keys)
+            canvas.keys[few.tile] = np.maximum(keys, tile_keys(planes, few, limits, bits, by), out=keys)
 
 
 def rounds(spans: Spans) -> tuple[IntArray, IntArray]:
@@ -169,9 +169,7 @@ def _sorted_order(values: IntArray) -> IntArray:
     return packed
 
 
-def _tile_keys(
-    planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None
-) -> IntArray:
+def tile_keys(planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None) -> IntArray:
     """Keys (S, 64) of some microtiles; negative where they are not covered."""
     # Edges that cross none of these microtiles are not evaluated at all.
     row, x, y = spans.row, spans.x, spans.y
