@@ -36,11 +36,12 @@ from quiltcli.layout import Layout, align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
-from quiltcli.render.setup import facets_and_layout
+from quiltcli.render.setup import facets_and_layout, texture_limits
 from quiltcli.render.unseen import unseen_notices
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
+from quiltcli.scene.textures.pool import check_textures
 from quiltcli.viewer.clip import settled_clip
 from quiltcli.viewer.view import View, facet_problems, view_problems, views_of
 
@@ -119,6 +120,9 @@ class _Findings:
             lacking = list(source.problems(job.frames)) if source is not None else []
             self.problems += lacking
             source = None if lacking else source
+            if scene is not None:
+                drawn = (texture for textures in scene.materials.textures for texture in textures)
+                self.run(check_textures, drawn, texture_limits(job))
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
         return scene, source
