@@ -7,7 +7,9 @@ against what there is before memory is taken, and nothing in it can be code.
 from __future__ import annotations
 
 import io
+import lzma
 import math
+import re
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -23,9 +25,17 @@ from quiltcli.formats.inputs import read_input
 
 _MOST_BYTES = 4 << 30
 _FIRST_DATE = (1980, 1, 1, 0, 0, 0)
-_SPOILT = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError, ValueError)
+_SPOILT = (
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, NotImplementedError, RuntimeError, OSError),
+    *(ValueError, TypeError),
+)
 """What reading a damaged archive may raise."""
-_READERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+# Versions 1 and 2 of the format, as NumPy writes numbers that are no records.
+_HEADER = re.compile(
+    rb"\x93NUMPY(?:\x01\x00(?P<length>..)|\x02\x00(?P<longer>....))\{'descr': '(?P<kind>[<>|][a-z]\d{1,2})', "
+    rb"'fortran_order': (?P<fortran>True|False), 'shape': \((?P<shape>[\d, ]{0,60})\),? *\} *\n",
+    re.DOTALL,
+)
 
 
 def npz_bytes(arrays: Mapping[str, NDArray[Any]]) -> bytes:
@@ -75,17 +85,25 @@ def _unpacked(data: bytes, wanted: Mapping[str, str]) -> tuple[list[str], dict[s
 
 
 def _array(member: bytes) -> NDArray[Any]:
-    """An array from a `.npy` file (ValueError)."""
-    file = io.BytesIO(member)
-    version = npy.read_magic(file)
-    if version not in _READERS:
-        raise ValueError("version")
-    shape, fortran, kind = _READERS[version](file)
-    count = math.prod(shape)
-    rest = member[file.tell() :]
-    if kind.hasobject or len(rest) != count * kind.itemsize:
+    """An array from a `.npy` file (ValueError).
+
+    Read here and not by NumPy, whose reader hands what stands in the header to Python's parser.
+    """
+    match = _HEADER.match(member)
+    if match is None:
+        raise ValueError("header")
+    kind, fortran, sides = match["kind"].decode(), match["fortran"] == b"True", match["shape"].split(b",")
+    shape = tuple(int(side) for side in sides if side.strip())
+    begin = match.end()
+    length = int.from_bytes(match["length"] or match["longer"], "little")
+    if begin != length + match.start("kind") - len(b"{'descr': '") or any(
+        side > _MOST_BYTES for side in shape
+    ):
         raise ValueError("length")
-    return np.frombuffer(rest, kind, count).reshape(shape, order="F" if fortran else "C")
+    count, dtype = math.prod(shape), np.dtype(kind)
+    if len(member) - begin != count * dtype.itemsize:
+        raise ValueError("length")
+    return np.frombuffer(member, dtype, count, begin).reshape(shape, order="F" if fortran else "C")
 
 
 def _strangers(path: Path, names: list[str], wanted: list[str]) -> list[Problem]:

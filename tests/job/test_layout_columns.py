@@ -161,3 +161,31 @@ def test_problems_of_the_layout_itself_name_the_row(path):
     rewrite(path, arrays)
     with pytest.raises(LayoutError, match=r"long\.columns\.npz: quilt_from_facet\[1\]"):
         read_layout(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"'shape': (9", b"'shape': ((9"),
+        (b"'<f8'", b"'<q9'"),
+        (b"'<f8'", b"[('a'"),
+        (b"{'descr'", b"{'descr"),
+        (b"(9, 3)", b"(9, 4)"),
+        (b"(9, 3)", b"(9999999999999999, 3)"),
+        (b"NUMPY\x01", b"NUMPY\x07"),
+        (b"\x00v\x00", b"\x00w\x00"),
+    ],
+)
+def test_a_header_that_is_not_numpys_is_never_run(old, new, path):
+    beside = path.with_name("long.columns.npz")
+    with zipfile.ZipFile(beside) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    assert old in members["du.npy"]
+    members["du.npy"] = members["du.npy"].replace(old, new, 1)
+    with zipfile.ZipFile(beside, "w") as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    path.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")  # no hash
+    assert said(path) == [
+        "long.columns.npz: is no NumPy archive of numbers, or is damaged (expected an .npz file)"
+    ]
