@@ -180,12 +180,14 @@ def _pixels(
     lens: Lens, position: FloatArray, rotation: FloatArray, places: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Pixels (n) across and down at which a camera sees places (n, 3), and whether they are ahead of it."""
-    right, down, ahead = rotation @ (places - position).T
+    x, y, z = (places[:, k] - position[k] for k in range(3))
+    # Written out: a matrix product sums in another order on another machine.
+    right, down, ahead = (row[0] * x + row[1] * y + row[2] * z for row in rotation.tolist())
     good = ahead > 0
     scale = 1 / np.where(good, ahead, 1)
-    x = lens.centre[0] + lens.focal[0] * right * scale
-    y = lens.centre[1] + lens.focal[1] * down * scale
-    return x, y, good
+    across = lens.centre[0] + lens.focal[0] * right * scale
+    below = lens.centre[1] + lens.focal[1] * down * scale
+    return across, below, good
 
 
 def bilinear(
