@@ -15,7 +15,8 @@ from quiltcli.job import dump_yaml, load_calibration_file
 from quiltcli.job.calibration import CalibrationFile
 
 COLUMNS = ("point", "name", "seen at", "lit at", "off by px")
-HEAD = "# The projector stands where quilt calibrate has found it.\n"
+HEAD = "# The projector stands where quilt calibrate has found it; what is lit of the mirror is to be set.\n"
+_DISK = 0.13  # metres: the mirror of the paper
 
 
 def calibrate_file(path: Path) -> tuple[CalibrationFile, Calibration]:
@@ -99,8 +100,8 @@ def write_display(path: Path, file: CalibrationFile, found: Calibration, *, over
         if data.get("kind") != "lightfield360":
             words = "is no display of the kind lightfield360, whose projector could be replaced"
             raise OutputError(Problem(words, file=str(path)))
-    elif file.tilt_deg != 45:
-        data["mirror"] = {"tilt_deg": file.tilt_deg}
+    else:
+        data["mirror"] = {"tilt_deg": file.tilt_deg, "outline": {"disk": _DISK}}
     data["image"] = list(file.image)
     data["projector"] = {"matrix": found.projector.matrix.tolist()}
     write_text(path, HEAD + dump_yaml(data))

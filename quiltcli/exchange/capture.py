@@ -24,9 +24,11 @@ from quiltcli.projection.camera import camera_display
 from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.frame import draw_frame
+from quiltcli.render.setup import texture_limits
 from quiltcli.scene import Scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
+from quiltcli.scene.textures.pool import TextureStore
 from quiltcli.viewer.viewer import Viewer
 
 NAME = "lightfield.yaml"
@@ -218,9 +220,10 @@ def _stage(path: Path) -> tuple[JobFile, Scene, SceneSource | None]:
         job = JobFile.model_construct(
             display=path, scene=path, frames=(1,), render=RenderSpec(), output=OutputSpec()
         )
-        return job, *load_moving_scene(spec, 30.0)
+        return job, *load_moving_scene(spec, 30.0, TextureStore(texture_limits(job)))
     job = load_job(path)
-    return job, *load_moving_scene(load_scene_file(job.scene), float(job.fps))
+    store = TextureStore(texture_limits(job))
+    return job, *load_moving_scene(load_scene_file(job.scene), float(job.fps), store)
 
 
 def _radius(scene: Scene, ring: Ring) -> float:

@@ -31,7 +31,7 @@ def luminance(rgb: NDArray[np.floating]) -> Float32Array:
     return result
 
 
-def mixed(rgb: NDArray[np.floating], filters: FloatArray) -> Float32Array:
+def mixed(rgb: NDArray[np.floating], filters: FloatArray) -> FloatArray:
     """Shares of the filters' colours that come nearest to a colour; none is below 0.
 
     By non-negative least squares. To cut at 0 what plain least squares say is not the nearest: it leaves
@@ -48,8 +48,7 @@ def mixed(rgb: NDArray[np.floating], filters: FloatArray) -> Float32Array:
     gram = filters @ filters.T
     alone = [_along(colour, filter) / gram[k, k] for k, filter in enumerate(filters)]
     if len(filters) == 1:
-        only: Float32Array = np.maximum(alone[0], 0)[..., None].astype(np.float32)
-        return only
+        return np.asarray(np.maximum(alone[0], 0)[..., None])
     shine = [_along(colour, filter) for filter in filters]
     det = gram[0, 0] * gram[1, 1] - gram[0, 1] * gram[1, 0]
     both = [
@@ -61,8 +60,7 @@ def mixed(rgb: NDArray[np.floating], filters: FloatArray) -> Float32Array:
     light = [np.maximum(share, 0) ** 2 * gram[k, k] for k, share in enumerate(alone)]
     first = light[0] >= light[1]
     rim = [np.where(first, np.maximum(alone[0], 0), 0), np.where(first, 0, np.maximum(alone[1], 0))]
-    found = np.stack([np.where(inner, both[k], rim[k]) for k in range(2)], axis=-1)
-    return found.astype(np.float32)
+    return np.stack([np.where(inner, both[k], rim[k]) for k in range(2)], axis=-1)
 
 
 def _along(colour: FloatArray, filter: FloatArray) -> FloatArray:

@@ -180,12 +180,14 @@ def _pixels(
     lens: Lens, position: FloatArray, rotation: FloatArray, places: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Pixels (n) across and down at which a camera sees places (n, 3), and whether they are ahead of it."""
-    right, down, ahead = rotation @ (places - position).T
+    x, y, z = (places[:, k] - position[k] for k in range(3))
+    # Written out: a matrix product sums in another order on another machine.
+    right, down, ahead = (row[0] * x + row[1] * y + row[2] * z for row in rotation.tolist())
     good = ahead > 0
     scale = 1 / np.where(good, ahead, 1)
-    x = lens.centre[0] + lens.focal[0] * right * scale
-    y = lens.centre[1] + lens.focal[1] * down * scale
-    return x, y, good
+    across = lens.centre[0] + lens.focal[0] * right * scale
+    below = lens.centre[1] + lens.focal[1] * down * scale
+    return across, below, good
 
 
 def bilinear(
@@ -203,10 +205,13 @@ def bilinear(
     inside = (x >= 0) & (y >= 0) & (x <= width) & (y <= height)
     u, v = np.where(inside, x, 0) - 0.5, np.where(inside, y, 0) - 0.5
     column, line = np.floor(u).astype(np.int64), np.floor(v).astype(np.int64)
-    total = np.zeros((len(x), 3))
-    for down in (0, 1):
-        for right in (0, 1):
-            share = np.abs(1 - right - (u - column)) * np.abs(1 - down - (v - line))
-            picked = values[np.clip(line + down, 0, height - 1), np.clip(column + right, 0, width - 1)]
-            total += share[:, None] * (curve[picked] if values.dtype == np.uint8 else picked)
+    total, pixels = np.zeros((len(x), 3)), values.reshape(-1, values.shape[2])
+    u -= column
+    v -= line
+    rows = [np.clip(line + down, 0, height - 1) * width for down in (0, 1)]
+    columns = [np.clip(column + right, 0, width - 1) for right in (0, 1)]
+    for row, near in zip(rows, (1 - v, v), strict=True):
+        for place, beside in zip(columns, (1 - u, u), strict=True):
+            picked = pixels.take(row + place, axis=0)
+            total += (near * beside)[:, None] * (curve.take(picked) if values.dtype == np.uint8 else picked)
     return total, inside

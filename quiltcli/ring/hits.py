@@ -13,6 +13,7 @@ from quiltcli.ring.forms import edge_values, forms_of
 from quiltcli.ring.raster import Mesh, Visible, depth
 from quiltcli.ring.rig import Pose
 from quiltcli.scene import Scene
+from quiltcli.visibility.resolve.footprints import PointEdges
 from quiltcli.visibility.resolve.hits import Hits, single_places
 from quiltcli.visibility.resolve.vectors import PointVectors
 
@@ -52,7 +53,28 @@ def ring_hits(pose: Pose, mesh: Mesh, scene: Scene, seen: Visible, part: slice, 
         weights=weights.astype(np.float32)[:, :, None],
         position=world[:, :, None],
         inside=pixel.size,
+        edges=None if scene.textures is None else _edges(mesh, seen, pixel, triangle, weights),
     )
+
+
+def _edges(mesh: Mesh, seen: Visible, pixel: IntArray, triangle: IntArray, weights: FloatArray) -> PointEdges:
+    """What textures are filtered by: how weights change to the neighbouring pixels' rays.
+
+    Every pixel has a viewpoint of its own, so no plane over the picture says it; the ray of the neighbour,
+    met with the same triangle, does.
+    """
+    row, column = np.divmod(pixel, seen.window.width)
+    slopes = np.zeros((2, 2, pixel.size))
+    for axis, (place, length, step) in enumerate(
+        ((column, seen.window.width, 1), (row, seen.window.height, seen.window.width))
+    ):
+        if length > 1:
+            way = np.where(place < length - 1, 1, -1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                beside, _ = met(mesh, seen, pixel + way * step, triangle)
+            # Beyond the horizon there is nothing to filter by.
+            slopes[:, axis] = np.nan_to_num((beside - weights) * way, posinf=0.0, neginf=0.0)
+    return PointEdges(triangle.astype(np.int32), weights, slopes)
 
 
 def met(mesh: Mesh, seen: Visible, pixel: IntArray, triangle: IntArray) -> tuple[FloatArray, FloatArray]:

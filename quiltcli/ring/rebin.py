@@ -15,7 +15,15 @@ def rays_of(pose: Pose, curve: Curve, x: FloatArray, y: FloatArray) -> Rays:
     """The rays that pixels (P,) of one side of the mirror show, in the world."""
     shown = backward(pose, curve, x, y)
     served = curve.points(np.array(pose.angle))
-    return Rays(pose.to_world(shown.viewer.T), pose.to_world(shown.mirror.T), served)
+    viewer, mirror = (_in_world(pose, places) for places in (shown.viewer, shown.mirror))
+    return Rays(viewer, mirror, served)
+
+
+def _in_world(pose: Pose, places: FloatArray) -> FloatArray:
+    """Places (3, P) of the frame in the world, (P, 3), with sums in the same order on every machine."""
+    e, f, y = (place + start for place, start in zip(places, pose.origin.tolist(), strict=True))
+    axes = pose.axes.tolist()
+    return np.stack([e * axes[0][k] + f * axes[1][k] + y * axes[2][k] for k in range(3)], axis=-1)
 
 
 def rebinned(field: Field, pose: Pose, curve: Curve, lit: BoolArray, frame: int = 1) -> Float32Array:

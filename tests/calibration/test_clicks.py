@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 from quiltcli.cli.group import main
 from quiltcli.job import check_file, dump_yaml
 from quiltcli.job.calibration import CalibrationFile
+from quiltcli.job.reference import EXAMPLES
 from tests.display.test_clicks import clicks, projector
 
 
@@ -37,6 +38,7 @@ def test_the_projector_stands_in_a_display_file(tmp_path: Path) -> None:
     assert "3545.00 px" in run.output
     data = yaml.safe_load(display.read_text())
     assert (data["kind"], data["image"]) == ("lightfield360", [768, 768])
+    assert check_file(display) == []
     np.testing.assert_allclose(data["projector"]["matrix"], projector().matrix, atol=1e-8)
 
 
@@ -112,3 +114,12 @@ def test_a_point_has_one_place(tmp_path: Path) -> None:
     text = "\n".join(map(str, check_file(path)))
     assert "points[0].at: cannot stand beside world" in text
     assert "points[1].mirror_deg: missing key" in text
+
+
+def test_the_example_of_the_reference_is_a_good_calibration(tmp_path: Path) -> None:
+    (tmp_path / "clicks.yaml").write_text(EXAMPLES["calibration"])
+    run = quilt(tmp_path / "clicks.yaml", "--json")
+    assert run.exit_code == 0, run.output
+    data = json.loads(run.output)
+    assert not data["mirrored"]
+    np.testing.assert_allclose(data["position"], [0, 0.6, 0], atol=0.02)

@@ -20,19 +20,19 @@ def test_shares_are_those_of_non_negative_least_squares() -> None:
     colours = np.random.default_rng(8).random((300, 3)) ** 2
     colours[:4] = [[1, 0, 0], [0, 0, 1], [0, 1, 0], [0, 0, 0]]
     for colour, shares in zip(colours, mixed(colours, TENT), strict=True):
-        np.testing.assert_allclose(shares, nnls(TENT.T, colour)[0], atol=1e-6)
+        np.testing.assert_allclose(shares, nnls(TENT.T, colour)[0], atol=1e-12)
 
 
 def test_what_is_left_over_is_square_to_the_colours_that_are_used() -> None:
     colours = np.random.default_rng(2).random((200, 3))
     shares = mixed(colours, TENT)
-    left = colours - shares.astype(float) @ TENT
+    left = colours - shares @ TENT
     along = left @ TENT.T
-    assert np.abs(along[shares > 0]).max() < 1e-6
-    assert (along[shares == 0] <= 1e-6).all()  # more of an unused colour would not help
+    assert np.abs(along[shares > 0]).max() < 1e-12
+    assert (along[shares == 0] <= 1e-12).all()  # more of an unused colour would not help
     plain = np.maximum(np.linalg.lstsq(TENT.T, colours.T, rcond=None)[0].T, 0)
     cut = np.linalg.norm(colours - plain @ TENT, axis=1)
-    assert (np.linalg.norm(left, axis=1) <= cut + 1e-6).all()
+    assert (np.linalg.norm(left, axis=1) <= cut + 1e-12).all()
     assert (shares == 0).any()
 
 

@@ -101,6 +101,8 @@ def _shaded(scene: Scene, target: Target, lines: Lines, triangle: np.ndarray) ->
         depth=distance,
         normals=scene.corner_normals,
         inside=triangle.size,
+        # Of a line alone nobody knows how far the next one is: textures are not filtered.
+        slopes=None if scene.textures is None else np.zeros((2, 2, triangle.size)),
     )
     hits = replace(hits, position=np.ascontiguousarray(position.T)[:, :, None])
     light = light_at_points("rgba", Shaded(scene, EYE, hits))

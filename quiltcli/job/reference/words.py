@@ -22,12 +22,12 @@ transform: {translate: [0, 1.2, 0], rotate_deg: [0, 15, 0]}
 quilt_calibration: 1
 image: [768, 768]
 points:                           # marks on the mirror, and the pixels that light them
-- {mirror_deg: 0, at: [-0.04, -0.0566], pixel: [606.4, 161.8]}
-- {mirror_deg: 0, at: [0.04, -0.0566], pixel: [606.1, 606.3]}
-- {mirror_deg: 0, at: [-0.04, 0.0566], pixel: [162.2, 162.1]}
-- {mirror_deg: 180, at: [-0.04, -0.0566], pixel: [128.3, 638.9]}
-- {mirror_deg: 180, at: [0.04, -0.0566], pixel: [129.1, 128.6]}
-- {mirror_deg: 180, at: [0.04, 0.0566], pixel: [639.6, 128.8]}
+- {mirror_deg: 0, at: [-0.04, -0.0566], pixel: [605.3, 605.0]}
+- {mirror_deg: 0, at: [0.04, -0.0566], pixel: [605.6, 162.6]}
+- {mirror_deg: 0, at: [-0.04, 0.0566], pixel: [131.1, 637.2]}
+- {mirror_deg: 180, at: [-0.04, -0.0566], pixel: [162.1, 162.2]}
+- {mirror_deg: 180, at: [0.04, -0.0566], pixel: [162.6, 606.2]}
+- {mirror_deg: 180, at: [0.04, 0.0566], pixel: [637.4, 636.7]}
 free: [f, rotation, position]     # the centre is known
 centre: [384, 384]
 """,

@@ -15,6 +15,7 @@ from quiltcli.job.mirror import MirrorDisplayFile
 from quiltcli.job.ring import RingSpec
 from quiltcli.lightfield import Field, load_field
 from quiltcli.render.antialiasing import sample_places
+from quiltcli.render.setup import texture_limits
 from quiltcli.ring.build import curve_of, rig_of, scene_problems
 from quiltcli.ring.cast import see_by_rays
 from quiltcli.ring.picture import See, Show
@@ -26,6 +27,7 @@ from quiltcli.scene import Scene
 from quiltcli.scene.bare import empty_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
+from quiltcli.scene.textures.pool import TextureStore
 
 METHODS: dict[str, See] = {"exact": see, "raycast": see_by_rays, "vertex": see_by_vertices}
 
@@ -112,7 +114,8 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
         photographs = load_field(load_lightfield_file(job.lightfield), frames)
         scene, source = empty_scene(), None
     else:
-        scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))
+        store = TextureStore(texture_limits(job))
+        scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps), store)
     raise_all(SceneError, source.problems(frames) if source else ())
     compensate = job.halftone is not None and job.halftone.compensate == "dwell"
     shortest = shortest_dwell(rig) if compensate else 1.0
