@@ -39,7 +39,7 @@ from quiltcli.job.model import (
 from quiltcli.job.names import NamesSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
-METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap")
+METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap", "tessellate")
 DEPTH_BITS = ("16", "24", "32f")
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
 COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
@@ -142,6 +142,8 @@ class RenderSpec(Model):
     """Drop triangles that face away from the viewer."""
     faces: Annotated[int, Field(ge=1, le=16384)] | None = None
     """Width and height of the faces that method: cubemap looks pixels up in, 2048 when absent, pixels."""
+    threshold: Annotated[float, Field(ge=1e-4, le=1)] | None = None
+    """Longest edge on the display for method: tessellate, as a share of its size; 0.01 when absent."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
 
@@ -155,7 +157,7 @@ class RenderSpec(Model):
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        by_distance = ("homography", "raycast", "cubemap")
+        by_distance = ("homography", "raycast", "cubemap", "tessellate")
         return "zv" in channels or self.depth_bits is not None or self.method not in by_distance
 
     def cross_checks(self) -> Iterator[Complaint]:
@@ -167,6 +169,10 @@ class RenderSpec(Model):
             yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
         if self.method != "cubemap" and self.faces is not None:
             yield ("faces",), f"belongs to method: cubemap, got method: {self.method}"
+        if self.method != "tessellate" and self.threshold is not None:
+            yield ("threshold",), f"belongs to method: tessellate, got method: {self.method}"
+        if self.method == "tessellate" and self.samples > 1:
+            yield ("samples",), f"expected 1 beside method: tessellate, got {self.samples}"
         if self.method == "cubemap" and self.depth_bits is not None:
             yield ("depth_bits",), "a cube map has exact depth (expected no such key beside method: cubemap)"
         if self.method == "raycast" and self.samples > 1:

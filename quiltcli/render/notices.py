@@ -41,7 +41,8 @@ def job_warnings(
 ) -> Iterator[str]:
     """The same of a job of which nothing is set up yet but its display and its layout."""
     yield from display_notices(facets)
-    if job.render.bleed > layout.padding:
+    placed = layout.page[layout.page >= 0].tolist()
+    if job.render.bleed > layout.padding and len(set(placed)) < len(placed):
         yield (
             f"the bleed of {job.render.bleed} pixels is wider than the layout's padding of"
             f" {layout.padding}: neighbours share what lies between them"

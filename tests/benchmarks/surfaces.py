@@ -25,6 +25,7 @@ from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import aim
 from quiltcli.visibility.shares import bin_frame
 from tests.benchmarks.page import put
+from tests.helpers.curved_jobs import boxes, curved_job
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "surfaces.md"
@@ -245,7 +246,35 @@ def _psnr(picture: np.ndarray, truth: np.ndarray) -> float:
     return float(-10 * np.log10(((picture - truth) ** 2).mean()))
 
 
+def threshold_table() -> str:
+    """Wrong pixels and pieces of the parametric paper's method, by its threshold: boxes in a sphere."""
+    rows = []
+    truth: Buffers = {}
+    for threshold in (None, 0.2, 0.1, 0.05, 0.025, 0.012, 0.01):
+        with tempfile.TemporaryDirectory() as name:
+            how = "" if threshold is None else f"render: {{method: tessellate, threshold: {threshold}}}\n"
+            display = "surfaces:\n- {kind: sphere, radius: 1, pixels: [1024, 512]}"
+            more = how + "output: {channels: [triangle, Z]}\n"
+            job = curved_job(Path(name), display, boxes(150, 0.3, 0.45), (1.2, 0.9, 2.7), more=more)
+            stage = set_stage(job)
+        viewer, buffers = stage.views([1])[0].viewer, new_buffers(stage)
+        begin = time.process_time()
+        record = draw_frame(stage, viewer, buffers)
+        seconds = time.process_time() - begin
+        if threshold is None:
+            truth = buffers
+            rows.append(("exact", "–", f"{record.triangles:,} triangles", f"{seconds:.2f} s"))
+            continue
+        shown = truth["triangle"] > 0
+        wrong = float((buffers["triangle"] != truth["triangle"])[shown].mean())
+        rows.append((f"{100 * threshold:g} %", f"{wrong:.1e}", f"{record.pairs:,}", f"{seconds:.2f} s"))
+    head = "| threshold, of the radius | wrong pixels | pieces | processor time |\n"
+    head += "| --- | ---: | ---: | ---: |\n"
+    return head + "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
 TABLES = {
+    "thresholds": threshold_table,
     "pieces": pieces_table,
     "replication": facets_table,
     "cubemap": cubemap_table,

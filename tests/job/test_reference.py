@@ -20,7 +20,7 @@ BARE = {
     *("quilt_display", "quilt_job", "quilt_layout", "quilt_scene"),
     *("id", "page", "max_pages", "page_facets", "samples"),
     *("aspect", "metallic", "roughness", "specular", "scale", "matrix", "facets"),
-    *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces"),
+    *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces", "threshold"),
     *("look", "up", "direction", "color", "emission", "orientation"),
 }
 

@@ -17,7 +17,8 @@ from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.setup import Stage, stage_of
-from quiltcli.scene import Materials, Scene
+from quiltcli.scene import Scene
+from quiltcli.scene.bare import mesh_scene
 from quiltcli.viewer.viewer import Viewer
 
 Camera: TypeAlias = tuple[Facets, Layout]
@@ -67,31 +68,6 @@ def camera_stage(job: JobFile, through: Camera, scene: Scene) -> Stage:
     """The stage of a picture: a scene behind the camera's one facet, with exact depth."""
     exact = job.render.model_copy(update={"method": "homography", "depth_bits": None})
     return stage_of(job.model_copy(update={"render": exact}), *through, scene, bleed=0)
-
-
-def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:
-    """A scene of bare triangles: what they look like is not asked."""
-    return Scene(
-        vertices=vertices,
-        triangles=triangles,
-        normals=np.zeros(vertices.shape, dtype=np.float32),
-        colors=np.ones(vertices.shape, dtype=np.float32),
-        flat=np.ones(len(triangles), dtype=np.bool_),
-        object=np.zeros(len(triangles), dtype=np.int32),
-        material=np.zeros(len(triangles), dtype=np.int32),
-        objects=("display",),
-        materials=Materials(
-            np.ones((1, 3), np.float32),
-            np.zeros(1, np.float32),
-            np.ones(1, np.float32),
-            np.zeros((1, 3), np.float32),
-            np.ones(1, dtype=np.bool_),
-            np.ones(1, np.float32),
-        ),
-        lights=(),
-        background=np.zeros(3, dtype=np.float32),
-        notices=(),
-    )
 
 
 def displayed_light(

@@ -18,7 +18,6 @@ from quiltcli.analysis.simulate.picture import (
     displayed_light,
     exact,
     first_triangles,
-    mesh_scene,
     picture_rays,
     with_channels,
 )
@@ -39,6 +38,7 @@ from quiltcli.projection.camera import aimed, frame_display
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.setup import Stage
+from quiltcli.scene.bare import mesh_scene
 from quiltcli.viewer.viewer import Viewer
 
 SCENES = ("ghost", "solid", "none")

@@ -103,14 +103,14 @@ def cast_pixels(target: Target, neighbours: Neighbours, pixels: Places, normals:
         facet=pixels.facet[rows].astype(np.int32),
         triangle=triangle.astype(np.int32),
         position=points,
-        weights=np.stack(_weights(target, triangle, position)),
+        weights=np.stack(barycentric(target, triangle, position)),
         depth=target.viewer.depth_of(points),
         normals=normals,
         inside=int(np.count_nonzero(~pixels.bleed[rows])),
     )
 
 
-def _weights(target: Target, triangle: IntArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
+def barycentric(target: Target, triangle: IntArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Barycentric weights (P,) of the second and third corner at points (P, 3) of triangles (P,)."""
     a, b, c = (target.corners[target.triangles[triangle, k]] for k in range(3))
     normal = target.plane[triangle, :3]
