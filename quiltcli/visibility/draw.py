@@ -20,6 +20,7 @@ from quiltcli.projection.planar import QuiltRays
 from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.resolve.displaced import read_displaced
+from quiltcli.visibility.resolve.footprints import Cells
 from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.pixels import MixedTiles
 from quiltcli.visibility.resolve.reader import Reader
@@ -59,6 +60,7 @@ from quiltcli.visibility.setup.samples import Samples, samples_of
 __all__ = [
     "BlockPairs",
     "Blocks",
+    "Cells",
     "Drawing",
     "Frame",
     "Hits",
@@ -124,6 +126,7 @@ class Drawing:
         table: planes of the pairs.
         limits: how depth is measured.
         bits: bits of the serial in a key.
+        cells: the parts of pixels that its samples stand for; None for all of them.
         samples: where the rays of patches go through; None of flat facets.
     """
 
@@ -132,6 +135,7 @@ class Drawing:
     table: PlaneTable
     limits: DepthRange
     bits: int
+    cells: Cells | None = None
     samples: Samples | None = None
 
     def regions(
@@ -144,7 +148,9 @@ class Drawing:
             scene: what was drawn; its normals are needed where they are wanted.
             largest: microtiles from side to side of the largest regions, SQUARE or 1.
         """
-        reader = Reader(self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted)
+        reader = Reader(
+            self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted, self.cells
+        )
         if self.samples is not None:
             return read_displaced(reader, self.samples)
         return read_canvas(reader, largest)
@@ -187,13 +193,16 @@ def rasterize(
     drawing.done()
 
 
-def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None) -> Drawing:
+def draw(
+    frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None, cells: Cells | None = None
+) -> Drawing:
     """Draw the triangles of one batch.
 
     Args:
         frame: the frame.
         batch: one of `batches(frame)`.
         sample: (F, 2) where in each facet's pixels to look, in pixels from their centres; None for there.
+        cells: the parts of the pixels that the sample stands for; None for all of them.
     """
     # What will be drawn on: the batch's microtiles, their rays, and how keys of depth are made.
     counts = frame.pairs.per_block
@@ -201,7 +210,7 @@ def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None)
     bits = serial_bits(int(counts[block].sum()))
     canvas = new_canvas(block, frame.blocks)
     if block.size and block[0] >= frame.blocks.flat:
-        return _draw_patches(frame, canvas, bits, sample)
+        return _draw_patches(frame, canvas, bits, sample, cells)
     rays = ray_matrices(frame.rays.eye_from_quilt, frame.blocks, block, sample)
     viewer = frame.viewer
     limits = DepthRange(
@@ -222,10 +231,12 @@ def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None)
     rows, culled = np.flatnonzero(some & small), frame.sight.culled
     draw_small(pairs, rows, table, canvas, limits, bits, by, covering, culled=culled)
     draw_large(large, spans, covering, canvas, limits, bits, by)
-    return Drawing(frame.blocks, canvas, table, limits, bits)
+    return Drawing(frame.blocks, canvas, table, limits, bits, cells)
 
 
-def _draw_patches(frame: Frame, canvas: Canvas, bits: int, sample: FloatArray | None) -> Drawing:
+def _draw_patches(
+    frame: Frame, canvas: Canvas, bits: int, sample: FloatArray | None, cells: Cells | None
+) -> Drawing:
     """Draw the triangles of a batch of patches; for the arguments see `draw`."""
     rays, patches, viewer, block = frame.rays, frame.patches, frame.viewer, canvas.block
     assert patches is not None
@@ -248,4 +259,4 @@ def _draw_patches(frame: Frame, canvas: Canvas, bits: int, sample: FloatArray | 
     some = np.flatnonzero((pairs.box[1] >= pairs.box[0]) & (pairs.box[3] >= pairs.box[2]))
     planes = table.add(pairs, some, DISPLACED).compact()
     draw_displaced(planes, canvas, samples, limits, bits)
-    return Drawing(frame.blocks, canvas, table, limits, bits, samples)
+    return Drawing(frame.blocks, canvas, table, limits, bits, cells, samples)

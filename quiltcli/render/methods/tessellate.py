@@ -22,7 +22,7 @@ from quiltcli.projection.camera import raster_display
 from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background, new_buffers
 from quiltcli.render.frame import draw_frame
-from quiltcli.render.methods.raycast import barycentric, pixels_of
+from quiltcli.render.methods.raycast import barycentric, pixels_of, weight_slopes
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene.bare import mesh_scene
@@ -67,6 +67,7 @@ def draw_tessellated(
     rays = viewer_rays(stage.layout, stage.facets, lit, viewer)
     lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers, rays)
     target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
+    sloped = stage.scene.textures is not None
     threshold, pieces, visible = stage.job.render.threshold or THRESHOLD, 0, 0
     for row in np.flatnonzero(lit).tolist():
         chart = stage.facets.charts[row]
@@ -92,6 +93,8 @@ def draw_tessellated(
             position = direction * distance[:, None]
             triangle = found.triangle[shown[at[seen]]]
             points = np.ascontiguousarray(position.T)
+            matrix = pixels.ray[seen]
+            ray = matrix[:, :, 0] * x[seen, None] + matrix[:, :, 1] * y[seen, None] + matrix[:, :, 2]
             hits = point_hits(
                 first=address[seen],
                 facet=pixels.facet[seen].astype(np.int32),
@@ -101,6 +104,7 @@ def draw_tessellated(
                 depth=depth[at[seen]],
                 normals=stage.scene.corner_normals,
                 inside=int(np.count_nonzero(~pixels.bleed[seen])),
+                slopes=weight_slopes(target, triangle, matrix, ray, position) if sloped else None,
             )
             if seen.size:
                 fill(buffers, stage.job.output.channels, viewer, Shaded(stage.scene, viewer.eye, hits))
