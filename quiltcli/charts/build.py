@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,10 @@ from quiltcli.charts.projections import FACES, cube_face
 from quiltcli.charts.projections import KINDS as PROJECTIONS
 from quiltcli.charts.shapes import Placed, Shape, slopes
 from quiltcli.errors import DisplayError, Problem
-from quiltcli.formats.noted import noted_digest
 from quiltcli.formats.numbers import read_numbers
 from quiltcli.geometry import BoolArray, FloatArray, applied, rotation_deg
 from quiltcli.geometry.formulas import parse
+from quiltcli.job.digest import file_sha256
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.dump import plain
 from quiltcli.job.lengths import exact_metres
@@ -109,12 +108,7 @@ def _cuts(spec: Any) -> tuple[tuple[int, ...], tuple[int, ...]]:
 
 def record_of(spec: Any, display: DisplayFile) -> str:
     """A surface or a projection as JSON that does not depend on where its files lie, only on their bytes."""
-
-    def file_text(path: Path) -> str:
-        digest = noted_digest(path)
-        return digest if digest is not None else path.name
-
-    data = {"units": display.metres, **plain(spec, file_text)}
+    data = {"units": display.metres, **plain(spec, file_sha256)}
     data.pop("place", None)
     matrix = display.world_from_local
     if matrix is not None:

@@ -46,7 +46,7 @@ from quiltcli.job.names import NamesSpec
 from quiltcli.job.ring import RingSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
-METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap")
+METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap", "tessellate")
 RING_METHODS = ("exact", "raycast", "vertex")
 DEPTH_BITS = ("16", "24", "32f")
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
@@ -162,6 +162,8 @@ class RenderSpec(Model):
     """Width and height of the faces that method: cubemap looks pixels up in, 2048 when absent, pixels."""
     double_sided: Annotated[str, OneOf(SIDES)] = "all"
     """Surfaces whose backs are seen: all, or those that their files call so (file)."""
+    threshold: Annotated[float, Field(ge=1e-4, le=1)] | None = None
+    """Longest edge on the display for method: tessellate, as a share of its size; 0.01 when absent."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
     anisotropy: Annotated[int, Field(ge=1, le=MOST_PLACES)] = 16
@@ -186,7 +188,7 @@ class RenderSpec(Model):
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        by_distance = ("homography", "raycast", "cubemap", *RING_METHODS)
+        by_distance = ("homography", "raycast", "cubemap", "tessellate", *RING_METHODS)
         return "zv" in channels or self.depth_bits is not None or self.method not in by_distance
 
     def cross_checks(self) -> Iterator[Complaint]:
@@ -200,6 +202,10 @@ class RenderSpec(Model):
             yield ("tessellate",), f"belongs to method: vertex, got {self.method}"
         if self.method != "cubemap" and self.faces is not None:
             yield ("faces",), f"belongs to method: cubemap, got method: {self.method}"
+        if self.method != "tessellate" and self.threshold is not None:
+            yield ("threshold",), f"belongs to method: tessellate, got method: {self.method}"
+        if self.method == "tessellate" and self.samples > 1:
+            yield ("samples",), f"expected 1 beside method: tessellate, got {self.samples}"
         if self.method == "cubemap" and self.depth_bits is not None:
             yield ("depth_bits",), "a cube map has exact depth (expected no such key beside method: cubemap)"
         if self.method == "raycast" and self.samples > 1:

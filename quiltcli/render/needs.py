@@ -99,11 +99,14 @@ def disk_warnings(job: JobFile, layout: Layout, frames: Sequence[int] | None = N
 def method_problems(job: JobFile, facets: Facets) -> list[Problem]:
     """What a job asks for that curved facets do not have: methods that project onto planes."""
     how, source = job.render, job.render.source
+    standing = [chart is not None and chart.stands for chart in facets.charts]
+    if how.method == "tessellate" and not (standing and all(standing)):
+        return [source.problem("method", "tessellate is for displays of curved surfaces and nothing else")]
     if not facets.charts:
         return []
-    if how.method not in ("homography", "raycast", "cubemap"):
+    if how.method not in ("homography", "raycast", "cubemap", "tessellate"):
         words = f"{how.method} projects onto flat facets, and the display has curved ones"
-        return [source.problem("method", f"{words} (expected homography, raycast or cubemap)")]
+        return [source.problem("method", f"{words} (expected homography, raycast, cubemap or tessellate)")]
     if how.depth_bits is not None:
         words = "a depth buffer of so many bits belongs to flat facets, and the display has curved ones"
         return [source.problem("depth_bits", f"{words} (expected no such key)")]

@@ -44,7 +44,8 @@ def job_warnings(
 ) -> Iterator[str]:
     """The same of a job of which nothing is set up yet but its display and its layout."""
     yield from display_notices(facets)
-    if job.render.bleed > layout.padding:
+    placed = layout.page[layout.page >= 0].tolist()
+    if job.render.bleed > layout.padding and len(set(placed)) < len(placed):
         bleed, padding = job.render.bleed, layout.padding
         wider = f"set layout.padding to {bleed}" if isinstance(job.layout, PackSpec) else ""
         wider = f"pack it with --padding {bleed}" if isinstance(job.layout, Path) else wider

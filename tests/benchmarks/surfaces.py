@@ -25,6 +25,7 @@ from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import aim
 from quiltcli.visibility.shares import bin_frame
 from tests.benchmarks.page import put
+from tests.helpers.curved_jobs import boxes, curved_job
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "surfaces.md"
@@ -225,15 +226,19 @@ def cubemap_table() -> str:
     display = "quilt_display: 1\nprojection: {kind: cylinder, pixels: [1600, 1200]}\n"
     eye, at = (0, 1.7, 0), (0, 1.7, -1)
     stage, viewer = staged(display, "city", eye, at, "output: {channels: [rgba]}\n")
-    more = "render: {samples: 16}\noutput: {channels: [rgba]}\n"
+    more = "render: {samples: 36}\noutput: {channels: [rgba]}\n"
     fine, _ = staged(display, "city", eye, at, more)
     truth = _light(drawn(fine, viewer)[0])
     rows = [("exact, one sample a pixel", _psnr(_light(drawn(stage, viewer)[0]), truth))]
+    for samples in (4, 9):
+        more = f"render: {{samples: {samples}}}\noutput: {{channels: [rgba]}}\n"
+        finer, viewer = staged(display, "city", eye, at, more)
+        rows.append((f"exact, {samples} samples a pixel", _psnr(_light(drawn(finer, viewer)[0]), truth)))
     for faces in (512, 1024, 2048):
         more = f"render: {{method: cubemap, faces: {faces}}}\noutput: {{channels: [rgba]}}\n"
         mapped, viewer = staged(display, "city", eye, at, more)
         rows.append((f"cube map, faces of {faces}", _psnr(_light(drawn(mapped, viewer)[0]), truth)))
-    head = "| picture | PSNR against 16 exact rays a pixel |\n| --- | ---: |\n"
+    head = "| picture | PSNR against 36 exact samples a pixel |\n| --- | ---: |\n"
     return head + "".join(f"| {name} | {value:.1f} dB |\n" for name, value in rows)
 
 
@@ -245,7 +250,35 @@ def _psnr(picture: np.ndarray, truth: np.ndarray) -> float:
     return float(-10 * np.log10(((picture - truth) ** 2).mean()))
 
 
+def threshold_table() -> str:
+    """Wrong pixels and pieces of the parametric paper's method, by its threshold: boxes in a sphere."""
+    rows = []
+    truth: Buffers = {}
+    for threshold in (None, 0.2, 0.1, 0.05, 0.025, 0.012, 0.01):
+        with tempfile.TemporaryDirectory() as name:
+            how = "" if threshold is None else f"render: {{method: tessellate, threshold: {threshold}}}\n"
+            display = "surfaces:\n- {kind: sphere, radius: 1, pixels: [1024, 512]}"
+            more = how + "output: {channels: [triangle, Z]}\n"
+            job = curved_job(Path(name), display, boxes(150, 0.3, 0.45), (1.2, 0.9, 2.7), more=more)
+            stage = set_stage(job)
+        viewer, buffers = stage.views([1])[0].viewer, new_buffers(stage)
+        begin = time.process_time()
+        record = draw_frame(stage, viewer, buffers)
+        seconds = time.process_time() - begin
+        if threshold is None:
+            truth = buffers
+            rows.append(("exact", "–", f"{record.triangles:,} triangles", f"{seconds:.2f} s"))
+            continue
+        shown = truth["triangle"] > 0
+        wrong = float((buffers["triangle"] != truth["triangle"])[shown].mean())
+        rows.append((f"{100 * threshold:g} %", f"{wrong:.1e}", f"{record.pairs:,}", f"{seconds:.2f} s"))
+    head = "| threshold, of the radius | wrong pixels | pieces | processor time |\n"
+    head += "| --- | ---: | ---: | ---: |\n"
+    return head + "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
 TABLES = {
+    "thresholds": threshold_table,
     "pieces": pieces_table,
     "replication": facets_table,
     "cubemap": cubemap_table,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -82,6 +83,23 @@ def test_methods_for_flat_facets_are_refused_with_their_line(keys: str, words: s
         code, said = quilt(command, tmp_path / "job.yaml")
         assert code in (1, 2)
         assert words in said
+
+
+def test_a_map_is_packed_once_and_rendered_with_that_layout(tmp_path: Path) -> None:
+    from tests.helpers.curved_jobs import write_map
+
+    x, y = np.meshgrid(np.linspace(-1, 1, 64), np.linspace(0.5, -0.5, 32))
+    write_map(tmp_path / "map.exr", np.stack((x, y, 0.2 * x * x)))
+    curved_job(tmp_path, "surfaces:\n- {kind: map, file: map.exr}", boxes(5, 0.5, 1.5), (0.1, 0, 2))
+    assert quilt("pack", tmp_path / "display.yaml", "-o", tmp_path / "layout.yaml")[0] == 0
+    layout = f"layout={tmp_path / 'layout.yaml'}"
+    code, said = quilt("render", tmp_path / "job.yaml", "-j", "1", "--set", layout)
+    assert code == 0, said
+    # Another map is another display.
+    write_map(tmp_path / "map.exr", np.stack((x, y, 0.3 * x * x)))
+    code, said = quilt("render", tmp_path / "job.yaml", "-j", "1", "--set", layout, "--overwrite")
+    assert code == 2
+    assert "made for other geometry" in said
 
 
 def test_a_layout_that_shears_a_surface_is_refused(tmp_path: Path) -> None:

@@ -52,6 +52,25 @@ def test_a_mesh_of_a_surface_reads_back_as_a_surface(tmp_path: Path) -> None:
     assert (first.normals(x, y) * second.normals(x, y)).sum(axis=0).min() > 0.99
 
 
+def test_a_warp_mesh_of_a_projection_reads_back_as_the_same_directions(tmp_path: Path) -> None:
+    keys = "kind: cylinder, hfov_deg: 120, pixels: [256, 128]"
+    (tmp_path / "d.yaml").write_text(f"quilt_display: 1\nprojection: {{{keys}}}\n")
+    result = CliRunner().invoke(main, ["export", str(tmp_path / "d.yaml"), "-o", str(tmp_path / "warp.data")])
+    assert result.exit_code == 0, result.output
+    first = load_display(load_display_file(tmp_path / "d.yaml")).charts[0]
+    text = "quilt_display: 1\nprojection: {kind: mesh, file: warp.data, pixels: [256, 128]}\n"
+    (tmp_path / "m.yaml").write_text(text)
+    second = load_display(load_display_file(tmp_path / "m.yaml")).charts[0]
+    assert first is not None
+    assert second is not None
+    x, y = np.meshgrid(np.arange(256) + 0.5, np.arange(128) + 0.5)
+    ways = [chart.points(x, y) for chart in (first, second)]
+    ways = [way / np.sqrt((way**2).sum(axis=0)) for way in ways]
+    known = np.isfinite(ways[1].sum(axis=0))
+    assert known.mean() > 0.95
+    assert np.abs(ways[0] - ways[1])[:, known].max() < 2e-3
+
+
 def test_a_display_has_no_other_forms(tmp_path: Path) -> None:
     (tmp_path / "d.yaml").write_text("quilt_display: 1\nprojection: {kind: equirect, pixels: [64, 32]}\n")
     arguments = ["export", str(tmp_path / "d.yaml"), "-o", str(tmp_path / "m.exr"), "--format", "mpcdi"]

@@ -21,7 +21,7 @@ BARE = {
     *("views", "first_view", "first_row", "count"),
     *("id", "page", "max_pages", "page_facets", "samples"),
     *("aspect", "metallic", "roughness", "specular", "opacity", "cutoff", "scale", "matrix", "facets"),
-    *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces"),
+    *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces", "threshold"),
     *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),
     *("uv_set", "offset", "strength"),
 }

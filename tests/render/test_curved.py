@@ -220,3 +220,19 @@ def test_a_proxy_has_fewer_pixels_of_the_same_picture(name: str, tmp_path: Path)
     assert stage.facets.size.tolist() == [[size[0] // 2, size[1] // 2]]
     z = drawn(stage, viewer)["Z"]
     assert (np.isfinite(z) == (stage.owners > 0)).all()
+
+
+def test_textures_are_looked_up_alike_by_both_exact_methods(tmp_path: Path) -> None:
+    hall = Path(__file__).parents[2] / "scenes" / "hall.yaml"
+    pictures = []
+    for method in METHODS:
+        display = "projection: {kind: equirect, pixels: [256, 128]}"
+        more = f"render: {{method: {method}}}\noutput: {{channels: [rgba, Z, albedo]}}\n"
+        job = curved_job(tmp_path, display, boxes(1, 0.1, 0.1), (0.2, 1.5, 0.3), (0, 1.5, -1), more)
+        stage, viewer = staged(job.model_copy(update={"scene": hall}))
+        buffers = drawn(stage, viewer)
+        pictures.append([page(stage, part).astype(np.float64) for part in buffers.values()])
+    for ours, rays in zip(*pictures, strict=True):
+        both = np.isfinite(ours) & np.isfinite(rays)
+        assert both.mean() > 0.5
+        assert np.quantile(np.abs(ours - rays)[both], 0.98) < 0.02

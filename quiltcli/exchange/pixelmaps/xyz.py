@@ -30,13 +30,13 @@ def write_display_map(facets: Facets, path: Path, format_name: str | None) -> li
     Args:
         facets: the display.
         path: the file; NAME_facet_0002.EXT and so on of several facets.
-        format_name: a key of `FORMATS`; by default `obj` for such a file, else `xyz`.
+        format_name: a key of `FORMATS`; by default `obj` or `data` for such a file, else `xyz`.
 
     Raises:
         LayoutError: an unknown format or suffix.
         OutputError: a file cannot be written.
     """
-    name = format_name or ("obj" if path.suffix.lower() == ".obj" else "xyz")
+    name = format_name or {".obj": "obj", ".data": "data"}.get(path.suffix.lower(), "xyz")
     if name not in FORMATS:
         near = suggest(name, FORMATS)
         hint = f"; did you mean {near}?" if near else ""
@@ -112,5 +112,39 @@ def _write_mesh(facets: Facets, facet: int, path: Path) -> None:
     write_text(path, "\n".join(lines) + "\n")
 
 
-FORMATS: dict[str, Callable[[Facets, int, Path], None]] = {"xyz": _write_points, "obj": _write_mesh}
+def _write_warp_mesh(facets: Facets, facet: int, path: Path) -> None:
+    """A warp mesh (Bourke's `.data`) of a projection: where in an equidistant fisheye of 180° it looks.
+
+    Raises:
+        LayoutError: the facet is no projection.
+    """
+    chart: Chart | None = facets.charts[facet] if facets.charts else None
+    if chart is None or chart.stands:
+        words = (
+            f"facet {facet + 1} is no projection (a warp mesh says where in a fisheye picture pixels look)"
+        )
+        raise LayoutError(Problem(words, file=facets.path))
+    width, height = chart.size
+    columns, rows = min(width, CELLS) + 1, min(height, CELLS) + 1
+    s, t = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
+    x, y, z = chart.points(s * width, t * height)
+    with np.errstate(invalid="ignore"):
+        radius = np.sqrt(x * x + y * y)
+        angle = np.arctan2(radius, -z) / (np.pi / 2)
+        scale = angle / np.where(radius > 0, radius, 1.0)
+        shown = angle <= 1.0
+    lines = ["2", f"{columns} {rows}"]
+    for j in range(rows):
+        for i in range(columns):
+            u, v = (0.5 + scale[j, i] * w[j, i] / 2 if shown[j, i] else 0.0 for w in (x, y))
+            place = (2 * s[j, i] - 1) * width / height, 1 - 2 * t[j, i]
+            lines.append(f"{place[0]:.9g} {place[1]:.9g} {u:.9g} {v:.9g} {1 if shown[j, i] else -1}")
+    write_text(path, "\n".join(lines) + "\n")
+
+
+FORMATS: dict[str, Callable[[Facets, int, Path], None]] = {
+    "xyz": _write_points,
+    "obj": _write_mesh,
+    "data": _write_warp_mesh,
+}
 """Forms of a facet by name."""

@@ -18,6 +18,7 @@ from quiltcli.render.frame import Exposure, TooNearError
 from quiltcli.render.frame import draw_frame as rasterize_frame
 from quiltcli.render.methods.cubemap import draw_cubemap
 from quiltcli.render.methods.raycast import cast_frame
+from quiltcli.render.methods.tessellate import draw_tessellated
 from quiltcli.render.methods.twopass import draw_twice
 from quiltcli.render.moments import Moment
 from quiltcli.render.report import FrameRecord, together
@@ -31,6 +32,7 @@ OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], Fram
     "twopass": draw_twice,
     "raycast": cast_frame,
     "cubemap": draw_cubemap,
+    "tessellate": draw_tessellated,
 }
 """Methods that do not rasterize the quilt."""
 

@@ -127,15 +127,15 @@ def cast_pixels(
         facet=pixels.facet[rows].astype(np.int32),
         triangle=triangle.astype(np.int32),
         position=points,
-        weights=np.stack(_weights(target, triangle, position)),
+        weights=np.stack(barycentric(target, triangle, position)),
         depth=target.viewer.depth_of(points),
         normals=normals,
         inside=int(np.count_nonzero(~pixels.bleed[rows])),
-        slopes=_slopes(target, triangle, matrix, ray, position) if sloped else None,
+        slopes=weight_slopes(target, triangle, matrix, ray, position) if sloped else None,
     )
 
 
-def _weights(target: Target, triangle: IntArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
+def barycentric(target: Target, triangle: IntArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Barycentric weights (P,) of the second and third corner at points (P, 3) of triangles (P,)."""
     a, b, c = (target.corners[target.triangles[triangle, k]] for k in range(3))
     normal = target.plane[triangle, :3]
@@ -144,7 +144,7 @@ def _weights(target: Target, triangle: IntArray, position: FloatArray) -> tuple[
     return second, dot(normal, cross(b - a, position - a)) / area
 
 
-def _slopes(
+def weight_slopes(
     target: Target, triangle: IntArray, matrix: FloatArray, ray: FloatArray, position: FloatArray
 ) -> FloatArray:
     """How the weights of points change from pixel to pixel (2, 2, P) [weight, axis].
@@ -166,7 +166,7 @@ def _slopes(
     for axis in range(2):
         step = matrix[:, :, axis]
         moved = scale[:, None] * (step - ray * (dot(normal, step) / along)[:, None])
-        result[:, axis] = _weights(target, triangle, a + moved)
+        result[:, axis] = barycentric(target, triangle, a + moved)
     return result
 
 

@@ -136,7 +136,8 @@ def pixel_hits(
         planes_of = edge_planes_of(
             planes, rows, x0, y0, reader.cells, reader.facet_of(planes.block.take(rows))
         )
-        edges = PixelEdges(planes_of, which, x.astype(np.float64), y.astype(np.float64), x0, y0)
+        exact_x, exact_y = (x, y) if known is None else (known.x, known.y)
+        edges = PixelEdges(planes_of, which, exact_x.astype(np.float64), exact_y.astype(np.float64), x0, y0)
     return Hits(
         places=places,
         chosen=None,
