@@ -122,8 +122,8 @@ class Drawing:
         table: planes of the pairs.
         limits: how depth is measured.
         bits: bits of the serial in a key.
-        cells: the parts of pixels that its samples stand for; None for all of them.
         soft: pixels that are seen through something, which the canvas has not; None where there are none.
+        cells: the parts of pixels that its samples stand for; None for all of them.
     """
 
     blocks: Blocks
