@@ -47,8 +47,8 @@ class Baked:
     source: IntArray
     group: IntArray
     uv: FloatArray | None = None
-    uv1: FloatArray | None = None
     opacities: Float32Array | None = None
+    uv1: FloatArray | None = None
 
 
 def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:

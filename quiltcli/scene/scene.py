@@ -73,14 +73,14 @@ class Scene:
         notices: sentences to tell the user once: what was dropped or assumed.
         uv: (V, 2) texture coordinates, v up, NaN where there are none; None when there are none at all.
         coverage: how the areas of the files' polygons compare with those of their triangles.
-        uv1: (V, 2) those of the second set, likewise.
-        textures: the pictures that surfaces are covered with; None where there are none, and in a scene that
-            was loaded to be looked into, not to be drawn.
         material_names: what materials are called, for mattes.
         material_name: (T,) index into `material_names`; None for the first everywhere.
         corner_motion: (T, 9) float32, how the first corner moves until the next frame, and what to add to
             that for the others; NaN where nobody knows, None where nothing moves or nobody asks.
         opacities: (V,) alpha of vertices, 0 to 1; None where all are 1.
+        uv1: (V, 2) those of the second set, likewise.
+        textures: the pictures that surfaces are covered with; None where there are none, and in a scene that
+            was loaded to be looked into, not to be drawn.
     """
 
     vertices: FloatArray
@@ -97,12 +97,12 @@ class Scene:
     notices: tuple[str, ...]
     uv: FloatArray | None = None
     coverage: Coverage = NOTHING
-    uv1: FloatArray | None = None
-    textures: Textures | None = None
     material_names: tuple[str, ...] = ("",)
     material_name: Int32Array | None = None
     corner_motion: Float32Array | None = None
     opacities: Float32Array | None = None
+    uv1: FloatArray | None = None
+    textures: Textures | None = None
 
     @cached_property
     def named(self) -> Int32Array:

@@ -131,6 +131,7 @@ class Drawing:
         samples: where the rays of patches go through; None of flat facets.
         cells: the parts of pixels that its samples stand for; None for all of them.
         soft: pixels that are seen through something, which the canvas has not; None where there are none.
+        cells: the parts of pixels that its samples stand for; None for all of them.
     """
 
     blocks: Blocks

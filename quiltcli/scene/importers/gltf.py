@@ -226,11 +226,11 @@ def surface_of(material: Material, gltf: Gltf | None = None) -> Surface:
         roughness=material.roughness,
         emission=(0.0, 0.0, 0.0) if material.unlit else material.emission,
         unlit=material.unlit,
-        textures=() if gltf is None else tuple(_textures(gltf, material)),
         opacity=material.color[3],
         alpha=material.alpha_mode.lower(),
         cutoff=material.cutoff,
         double_sided=material.double_sided,
+        textures=() if gltf is None else tuple(_textures(gltf, material)),
     )
 
 

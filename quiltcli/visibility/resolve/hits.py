@@ -150,21 +150,6 @@ class Hits:
         """Quilt addresses (P,)."""
         return self.places.pixel
 
-    def some(self, rows: IntArray) -> Hits:
-        """Some (n,) of hits that are single pixels, each a group of its own; how many are inside is lost."""
-        return Hits(
-            places=single_places(self.places.single[rows]),
-            chosen=None,
-            facet=self.facet[rows],
-            triangle=self.triangle[rows],
-            ray=self.ray[rows],
-            depth=self.depth[rows],
-            normal=None if self.normal is None else self.normal[rows],
-            weights=None if self.weights is None else self.weights[:, rows],
-            position=None if self.position is None else self.position[:, rows],
-            inside=0,
-        )
-
     def drawn(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values (P,) of the drawn pixels, of values (G, k), (G, 1) for whole groups, or (1, 1) for all."""
         k = self.depth.shape[1]
@@ -178,9 +163,18 @@ class Hits:
         flat = values.reshape(-1)
         return flat if index is None else np.asarray(flat.take(index))
 
-    def put(self, buffer: NDArray[Any], values: NDArray[Any]) -> None:
-        """Write values (G, k), (G, 1) for whole groups, or (1, 1) for all, into a flat buffer of any type."""
+    def put(self, buffer: NDArray[Any], values: NDArray[Any], some: IntArray | None = None) -> None:
+        """Write values (G, k), (G, 1) for whole groups, or (1, 1) for all, into a flat buffer of any type.
+
+        Args:
+            buffer: written to.
+            values: the values.
+            some: the only pixels written to, of all that are drawn; None for all.
+        """
         values = values.astype(buffer.dtype, copy=False)
+        if some is not None:
+            buffer[self.pixel[some]] = self.drawn(values)[some]
+            return
         self.places.put(buffer, values.reshape(-1) if values.size == 1 else self.drawn(values))
 
 
