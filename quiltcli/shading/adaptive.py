@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, FloatArray
+from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.scene import Scene
 from quiltcli.shading.brdf import alpha
 from quiltcli.shading.lights import Middle, asks_for_places, turns
@@ -25,6 +25,10 @@ from quiltcli.visibility.resolve.vectors import sum_of_products
 
 _FAR = 24.0
 """A function is smooth in a square that reaches a 24th of the way to the function's nearest pole."""
+
+_IN_A_PIXEL = 1 / 6
+"""What is so far from the middle of a microtile, as a share of `_FAR`, is `_FAR` pixels' reach from all in it:
+an eighth of the way for a pixel, and a 24th for what lies between pixel and middle."""
 
 _MOST = np.float32(2.0**100)
 _VARIED = 8
@@ -52,6 +56,13 @@ class NodeLight:
         """Its parts."""
         light = shade_apart(self.scene, self.eye, points_at_nodes(self.squares))
         return Light(self._of(light.diffuse), self._of(light.specular), self._of(light.emission))
+
+    def microtiles(self, part: slice) -> IntArray:
+        """The microtiles of some of the squares, by their index among those of all blocks."""
+        first, side = self.squares.tiles[part], self.squares.side
+        if side == 1:
+            return first.number
+        return first.split(side, self.squares.reader.canvas.tiles_across.take(first.block)).number
 
     def _of(self, colors: Shades) -> NodeColors:
         nodes = nodes_of(self.squares.side)
@@ -127,10 +138,35 @@ def shaded(regions: Iterable[Region], scene: Scene, eye: FloatArray) -> Iterator
             yield from (Shaded(scene, eye, hits) for hits in region.of(~smooth).hits())
 
 
-def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:
+def shaded_once(
+    regions: Iterable[Region], scene: Scene, eye: FloatArray
+) -> Iterator[tuple[Shaded, IntArray]]:
+    """Hits whose pixels have the same light all over, to half precision, and the microtiles they fill.
+
+    Of regions whose pixels see one triangle each, wherever in them one looks: the light of a pixel's centre
+    is the mean of it then. Nothing is said of microtiles in which it is not so for all pixels.
+    """
+    for region in regions:
+        if isinstance(region, MixedTiles):
+            continue
+        smooth = is_smooth(region, scene, eye)
+        some = region.of(smooth)
+        nodes = NodeLight(scene, eye, some)
+        for part in some.parts():
+            yield Shaded(scene, eye, some[part].read(), nodes, part), nodes.microtiles(part)
+        if region.side > 1:
+            yield from shaded_once(region.split(~smooth), scene, eye)
+            continue
+        rest = region.of(~smooth)
+        rest = rest.of(is_smooth(rest, scene, eye, _IN_A_PIXEL))
+        for part in rest.parts():
+            yield Shaded(scene, eye, rest[part].read()), rest.tiles[part].number
+
+
+def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray, share: float = 1.0) -> BoolArray:
     """Which squares (S,) have no glint, no shadow's edge and no grazing view in or near them.
 
-    They are seen from an eye (3,).
+    They are seen from an eye (3,); `share` is of the distance that counts as near.
     Light is made of few functions: the lengths of vectors, Schlick's and Smith's of the angle between
     normal and eye or lamp, and GGX's of the angle between normal and half vector, all with poles or
     kinks that are known. What a polynomial misses falls with the third power of the distance to them.
@@ -141,9 +177,9 @@ def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:
     ray, normal = nodes.middle_vectors(rays), nodes.middle_vectors(squares.normal)
     ray_over, normal_over = _over_length(ray), _over_length(normal)
     view, normal = -ray * ray_over, normal * normal_over
-    eye_turn = nodes.vectors_reach(rays) * ray_over
-    normal_turn = nodes.vectors_reach(squares.normal) * normal_over
-    depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse)
+    eye_turn = nodes.vectors_reach(rays) * ray_over * share
+    normal_turn = nodes.vectors_reach(squares.normal) * normal_over * share
+    depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse) * share
     middle = Middle(squares, eye, view, eye_turn, depth_turn)
     # The view: not grazing; where light or colour changes from place to place, not too steep.
     nv = sum_of_products(normal, view)

@@ -30,6 +30,7 @@ from quiltcli.visibility.scan.depth_buffers import DepthOrder
 from quiltcli.visibility.scan.keys import serial_bits
 from quiltcli.visibility.scan.large import covering_keys, draw_large
 from quiltcli.visibility.scan.order import BatchOrder
+from quiltcli.visibility.scan.settled import REACH, settled_tiles
 from quiltcli.visibility.scan.small import LIMIT, draw_small
 from quiltcli.visibility.scan.soft import Fragments, apart, soft_fragments
 from quiltcli.visibility.scan.spans import large_spans
@@ -194,19 +195,30 @@ def rasterize(
     drawing.done()
 
 
-def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None) -> Drawing:
+def draw(
+    frame: Frame,
+    batch: tuple[int, int],
+    sample: FloatArray | None = None,
+    *,
+    settled: bool = False,
+    done: BoolArray | None = None,
+) -> Drawing:
     """Draw the triangles of one batch.
 
     Args:
         frame: the frame.
         batch: one of `batches(frame)`.
         sample: (F, 2) where in each facet's pixels to look, in pixels from their centres; None for there.
+        settled: whether only microtiles are drawn in which all samples see one triangle.
+        done: (m,) microtiles of the batch's blocks that are not drawn.
     """
     # What will be drawn on: the batch's microtiles, their rays, and how keys of depth are made.
     counts = frame.pairs.per_block
     block = batch[0] + np.flatnonzero(counts[batch[0] : batch[1]])
     bits = serial_bits(int(counts[block].sum()))
     canvas = new_canvas(block, frame.blocks)
+    if done is not None:
+        canvas.used[done.take(canvas.number - frame.blocks.tiles(batch).start)] = False
     rays = ray_matrices(frame.rays.eye_from_quilt, frame.blocks, block, sample)
     viewer = frame.viewer
     limits = DepthRange(
@@ -215,7 +227,8 @@ def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None)
     by = None if frame.order is None else BatchOrder(frame.order, limits, frame.blocks.facet[block])
     # Triangles in homogeneous pixels, small ones apart from large ones.
     matrices = block_matrices(frame.rays, frame.blocks, block, sample)
-    pairs = warp(frame.sight, frame.pairs, frame.blocks, block, matrices)
+    reach = REACH if settled else 0.0
+    pairs = warp(frame.sight, frame.pairs, frame.blocks, block, matrices, reach)
     table = PlaneTable(pairs.triangle.size)
     width, height = pairs.box[1] - pairs.box[0], pairs.box[3] - pairs.box[2]
     some = np.minimum(width, height) >= 0
@@ -224,6 +237,11 @@ def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None)
         some, light = apart(pairs, frame.sight.soft, some)
     small = np.maximum(width, height) < LIMIT
     large = table.add(pairs, np.flatnonzero(some & ~small)).compact()
+    if settled:
+        opaque = np.ones(len(frame.sight.triangles), dtype=np.bool_)
+        if frame.sight.soft is not None:
+            opaque &= ~frame.sight.soft
+        canvas.used[:] &= settled_tiles(pairs, np.flatnonzero(some & small), large, opaque, canvas)
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
     spans = large_spans(large, canvas, by)
     covering = covering_keys(large, spans, canvas, bits) if by is None else None
