@@ -99,8 +99,9 @@ def add_samples(
 def _add_settled(stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums, times: int) -> BoolArray:
     """Add what all of so many samples see alike: smooth light where one triangle is all they can see.
 
-    The mean of smooth light over a pixel is that of its centre, closer than half floats can tell: it is
-    worked out once for a triangle and pixel, as multisampling does.
+    The mean of smooth light over a pixel is that of its centre, nearly: it is worked out once for a triangle
+    and pixel, as multisampling does. Where it is not smooth, at glints and shadows' edges, samples are looked
+    at one by one.
 
     Returns:
         (m,) the microtiles of the batch's blocks in which nothing is left to be looked at.

@@ -27,8 +27,8 @@ _FAR = 24.0
 """A function is smooth in a square that reaches a 24th of the way to the function's nearest pole."""
 
 _IN_A_PIXEL = 1 / 6
-"""What is so far from the middle of a microtile, as a share of `_FAR`, is `_FAR` pixels' reach from all in it:
-an eighth of the way for a pixel, and a 24th for what lies between pixel and middle."""
+"""So much of `_FAR` from the middle of a microtile is some twenty pixels from every pixel in it: over one pixel,
+the mean of light is that of its centre within half a percent."""
 
 _MOST = np.float32(2.0**100)
 _VARIED = 8
@@ -141,7 +141,7 @@ def shaded(regions: Iterable[Region], scene: Scene, eye: FloatArray) -> Iterator
 def shaded_once(
     regions: Iterable[Region], scene: Scene, eye: FloatArray
 ) -> Iterator[tuple[Shaded, IntArray]]:
-    """Hits whose pixels have the same light all over, to half precision, and the microtiles they fill.
+    """Hits whose pixels have nearly the same light all over, and the microtiles they fill.
 
     Of regions whose pixels see one triangle each, wherever in them one looks: the light of a pixel's centre
     is the mean of it then. Nothing is said of microtiles in which it is not so for all pixels.
@@ -158,6 +158,8 @@ def shaded_once(
             yield from shaded_once(region.split(~smooth), scene, eye)
             continue
         rest = region.of(~smooth)
+        if not rest.triangle.size:
+            continue
         rest = rest.of(is_smooth(rest, scene, eye, _IN_A_PIXEL))
         for part in rest.parts():
             yield Shaded(scene, eye, rest[part].read()), rest.tiles[part].number

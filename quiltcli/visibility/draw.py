@@ -233,7 +233,7 @@ def draw(
     width, height = pairs.box[1] - pairs.box[0], pairs.box[3] - pairs.box[2]
     some = np.minimum(width, height) >= 0
     light = np.zeros(0, dtype=np.int64)
-    if frame.sight.soft is not None:
+    if frame.sight.soft is not None and not settled:
         some, light = apart(pairs, frame.sight.soft, some)
     small = np.maximum(width, height) < LIMIT
     large = table.add(pairs, np.flatnonzero(some & ~small)).compact()
