@@ -50,6 +50,7 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) simulate scenes/demo_stereo.yaml -f 6 -o $(DOCS)/stereo-glasses.png --size 720x540 --supersample 3 --glasses half-color
 	$(QUILT) render scenes/demo.yaml -f 6 --overwrite
 	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(DOCS)/box_quilt.png
+	$(QUILT) simulate scenes/demo_hall.yaml -f 1 -o $(DOCS)/textures.png --size 720x480 --supersample 3
 	$(QUILT) path scenes/demo_cave.yaml -o $(DOCS)/take.png
 	$(QUILT) simulate scenes/demo_cave.yaml -f 120 -o $(DOCS)/cave-take.png --size 960x600 --supersample 2 --third-person
 	mv $(DOCS)/cave-take.left.png $(DOCS)/cave-take.png && rm $(DOCS)/cave-take.right.png
@@ -57,7 +58,7 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/channels.py out/demo/facets/facet_0001.0003.exr -o $(DOCS)/channels.png
 	$(PY) docs/pictures/motion_blur.py -o $(DOCS)/motion-blur.png
 	$(PY) docs/pictures/transparency.py -o $(DOCS)/transparency.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2

@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray
+from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.projection.gaze import Gaze
 from quiltcli.render.antialiasing import draw_samples, new_batch_sums
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
 from quiltcli.render.sums import summed
-from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
 from quiltcli.shading.layers import layers
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
@@ -103,10 +102,10 @@ def draw_layers(
             sums.add(layer.shaded, layer.weight)
         if layer.first.any():
             visible += int(np.count_nonzero(layer.first & layer.inside))
-            mine = layer.shaded.hits.some(np.flatnonzero(layer.first))
-            fill(buffers, data, gaze, Shaded(stage.scene, gaze.viewer.eye, mine))
+            mine = np.flatnonzero(layer.first)
+            fill(buffers, data, gaze, layer.shaded, mine)
             if order is not None:
-                fill_stored(buffers, order, mine)
+                fill_stored(buffers, order, layer.shaded.hits, mine)
     if light:
         sums.store(buffers, 1, stage.scene.background)
     return visible
@@ -130,11 +129,11 @@ def ordered(stage: Stage, frame: Frame) -> Frame:
     )
 
 
-def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits) -> None:
+def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits, some: IntArray | None = None) -> None:
     """Write into `zv` what the depth buffer holds, and into `Z` the depth that it is taken for."""
     wanted = [name for name in ("zv", "Z") if name in buffers]
     if wanted:
         assert hits.position is not None
         stored = dict(zip(("zv", "Z"), order.stored(hits.facet, hits.position), strict=True))
         for name in wanted:
-            hits.put(buffers[name], stored[name])
+            hits.put(buffers[name], stored[name], some)

@@ -31,6 +31,7 @@ class Baked:
         empty: triangles dropped for having no area.
         opacities: (V,) alpha, or None where no part has any.
         uv: (V, 2) texture coordinates, NaN where a part has none, or None where no part has any.
+        uv1: (V, 2) those of the second set, likewise.
         source: (V,) the vertex of the joined parts each one is a copy of.
         group: (V,) numbers that vertices of one computed normal share, -1 where the file gives one.
     """
@@ -47,6 +48,7 @@ class Baked:
     group: IntArray
     uv: FloatArray | None = None
     opacities: Float32Array | None = None
+    uv1: FloatArray | None = None
 
 
 def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
@@ -69,14 +71,14 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
     triangles, owner = triangles[keep], owner[keep]
 
     given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
-    colors, uv = _given_colors(parts), given_uv(parts)
+    colors, uv, uv1 = _given_colors(parts), *given_uv(parts)
     opacities = given_opacities(parts)
     source, triangles, normals, group = _with_normals(
         vertices,
         triangles,
         given,
         180.0 if mode != "auto" else CREASE_DEG,
-        keep_sources=colors is not None or uv is not None or opacities is not None,
+        keep_sources=any(values is not None for values in (colors, uv, uv1, opacities)),
     )
     return Baked(
         vertices=vertices[source],
@@ -88,6 +90,7 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
         infinite=int(np.count_nonzero(infinite)),
         empty=int(np.count_nonzero(empty)),
         uv=None if uv is None else uv[source],
+        uv1=None if uv1 is None else uv1[source],
         source=source,
         group=group,
         opacities=None if opacities is None else opacities[source],
@@ -161,11 +164,19 @@ def given_opacities(parts: Sequence[Part] | Sequence[Baked]) -> Float32Array | N
     return np.concatenate(given)
 
 
-def given_uv(parts: Sequence[Part] | Sequence[Baked]) -> FloatArray | None:
-    """Texture coordinates (V, 2) of all, NaN where some have none; None where none has."""
-    if all(part.uv is None for part in parts):
+def given_uv(parts: Sequence[Part] | Sequence[Baked]) -> tuple[FloatArray | None, FloatArray | None]:
+    """Texture coordinates (V, 2) of both sets, NaN where some have none; None where none has."""
+    sets = [[part.uv for part in parts], [part.uv1 for part in parts]]
+    counts = [len(part.vertices) for part in parts]
+    first, second = (_joined_uv(values, counts) for values in sets)
+    return first, second
+
+
+def _joined_uv(values: Sequence[FloatArray | None], counts: Sequence[int]) -> FloatArray | None:
+    if all(uv is None for uv in values):
         return None
-    return np.concatenate([np.full((len(p.vertices), 2), np.nan) if p.uv is None else p.uv for p in parts])
+    pairs = zip(values, counts, strict=True)
+    return np.concatenate([np.full((count, 2), np.nan) if uv is None else uv for uv, count in pairs])
 
 
 def _with_normals(

@@ -19,6 +19,7 @@ from quiltcli.scene.lights import Light, default_lights, directional, lights_of,
 from quiltcli.scene.materials import Surface, material_table
 from quiltcli.scene.objects import Brought, ObjectError, SceneObject, bring, load_object
 from quiltcli.scene.scene import Scene
+from quiltcli.scene.textures.notices import textures_not_drawn, textures_without_places
 
 if TYPE_CHECKING:
     from quiltcli.job.scene import LightSpec, ObjectSpec, SceneFile
@@ -59,7 +60,6 @@ class _Gathered:
     surfaces: dict[Surface, int] = field(default_factory=dict)
     named: list[list[int]] = field(default_factory=list)
     material_names: dict[str, int] = field(default_factory=dict)
-    textures: int = 0
     coverage: Coverage = NOTHING
     notices: list[str] = field(default_factory=list)
     lights: list[FileLight] = field(default_factory=list)
@@ -79,8 +79,9 @@ class _Gathered:
         self.materials.append([self.surfaces.setdefault(s, len(self.surfaces)) for s in brought.surfaces])
         called = [material or name for material in brought.materials]
         self.named.append([self.material_names.setdefault(m, len(self.material_names)) for m in called])
-        self.textures += asset.textures
         self.coverage += asset.coverage
+        self.notices += [f"{name}: {words}" for words in textures_not_drawn(brought.surfaces)]
+        self.notices += [f"{name}: {words}" for words in textures_without_places(baked, brought.surfaces)]
         for count, why in ((baked.infinite, "with NaN or infinite vertices"), (baked.empty, "of no area")):
             if count:
                 self.notices.append(f"{name}: {counted(count, 'triangle')} {why} dropped")
@@ -182,6 +183,7 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         for table in (gathered.materials, gathered.named)
     )
     triangles = [b.triangles + start for b, start in zip(baked, base, strict=False)]
+    uv, uv1 = given_uv(baked)
     return Scene(
         vertices=np.concatenate([b.vertices for b in baked]),
         triangles=np.concatenate(triangles).astype(np.int32),
@@ -194,7 +196,8 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         materials=material_table(list(gathered.surfaces)),
         lights=lights_in(lights, gathered.lights),
         background=np.array(background, dtype=np.float32),
-        uv=given_uv(baked),
+        uv=uv,
+        uv1=uv1,
         coverage=gathered.coverage,
         material_names=tuple(gathered.material_names),
         material_name=np.concatenate(named),
@@ -209,9 +212,6 @@ def _colors(baked: Baked) -> Float32Array:
 
 def _notices(gathered: _Gathered, lights: Sequence[LightSpec]) -> tuple[str, ...]:
     notices = list(gathered.notices)
-    if gathered.textures:
-        textures = counted(gathered.textures, "texture")
-        notices.append(f"textures are not drawn yet: {textures} ignored, base colours are shown instead")
     if not _has_lamps(lights, gathered.lights):
         left_out = any("of the file left out" in notice for notice in notices)
         why = "no lights are asked for" if left_out else "the scene has no lights"

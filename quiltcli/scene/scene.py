@@ -14,6 +14,7 @@ from quiltcli.scene.lights import Light
 
 if TYPE_CHECKING:
     from quiltcli.scene.materials import Texture
+    from quiltcli.scene.textures.pool import Textures
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Materials:
         emission: (M, 3) emitted radiance, linear.
         unlit: (M,) materials that show exactly `color`.
         specular: (M,) 0 to 1, strength of the layer that reflects; metals reflect all the same.
-        textures: the images that vary each, carried along and not drawn yet.
+        textures: the pictures that vary each.
         opacity: (M,) alpha, 0 to 1; None where all are 1.
         alpha: (M,) what alpha means, an index into `ALPHAS`; None where all are opaque.
         cutoff: (M,) the least alpha that `mask` shows.
@@ -77,6 +78,9 @@ class Scene:
         corner_motion: (T, 9) float32, how the first corner moves until the next frame, and what to add to
             that for the others; NaN where nobody knows, None where nothing moves or nobody asks.
         opacities: (V,) alpha of vertices, 0 to 1; None where all are 1.
+        uv1: (V, 2) those of the second set, likewise.
+        textures: the pictures that surfaces are covered with; None where there are none, and in a scene that
+            was loaded to be looked into, not to be drawn.
     """
 
     vertices: FloatArray
@@ -97,6 +101,8 @@ class Scene:
     material_name: Int32Array | None = None
     corner_motion: Float32Array | None = None
     opacities: Float32Array | None = None
+    uv1: FloatArray | None = None
+    textures: Textures | None = None
 
     @cached_property
     def named(self) -> Int32Array:

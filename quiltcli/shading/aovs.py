@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.channels import CHANNELS, MOST_HALF
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.projection.gaze import Gaze
 from quiltcli.scene import Scene
+from quiltcli.scene.textures.coordinates import corner_coordinates
 from quiltcli.shading.adaptive import Shaded, shaded
 from quiltcli.shading.materials import albedo_wants
 from quiltcli.shading.mattes import identities_of
@@ -25,6 +26,7 @@ from quiltcli.shading.motion import motion, motion_wants
 from quiltcli.shading.nodes import NodeColors
 from quiltcli.shading.shade import Shades, shading_wants
 from quiltcli.shading.surface import shading_normals
+from quiltcli.shading.textures.covers import UNLIT
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Drawing, Wanted
 
@@ -78,7 +80,7 @@ def _triangle(gaze: Gaze, shaded: Shaded) -> Values:
 
 
 def _normal(gaze: Gaze, shaded: Shaded) -> Values:
-    return shading_normals(shaded.hits)
+    return shading_normals(shaded.points)
 
 
 def _point(gaze: Gaze, shaded: Shaded) -> Values:
@@ -90,6 +92,15 @@ def _albedo(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
     return _halves(shaded.albedo)
 
 
+def _texture_place(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
+    """Texture coordinates of the first set, v up."""
+    seen = shaded.hits.points
+    assert seen.weights is not None
+    corners = corner_coordinates(shaded.scene, seen.triangle[:, 0], 0)[..., None]
+    second, third = (corners[:, k] - corners[:, 0] for k in (1, 2))
+    return tuple(corners[:, 0] + second * seen.weights[0] + third * seen.weights[1])
+
+
 def _diffuse(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
     return _halves(shaded.apart.diffuse)
 
@@ -99,7 +110,12 @@ def _specular(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
 
 
 def _emission(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
-    return _halves(shaded.apart.emission)
+    return _halves(shaded.emission if shaded.cover == UNLIT else shaded.apart.emission)
+
+
+def normal_wants(scene: Scene) -> Wanted:
+    """What shading normals ask of hits; normal maps bend them."""
+    return Wanted.NORMAL if scene.textures is None else Wanted.NORMAL | Wanted.EDGES
 
 
 def _matte(channel: str, gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
@@ -117,8 +133,9 @@ SOURCES: dict[str, Source] = {
     "facet": Source(_facet),
     "object": Source(_object),
     "triangle": Source(_triangle),
-    "N": Source(_normal, lambda _: Wanted.NORMAL),
+    "N": Source(_normal, normal_wants),
     "P": Source(_point, lambda _: Wanted.POSITION),
+    "uv": Source(_texture_place, lambda _: Wanted.WEIGHTS),
     "albedo": Source(_albedo, albedo_wants),
     "diffuse": Source(_diffuse, shading_wants, light=True),
     "specular": Source(_specular, shading_wants, light=True),
@@ -163,12 +180,18 @@ def shaded_for(
     return (Shaded(scene, eye, hits) for hits in drawing.hits(wanted, scene))
 
 
-def fill(buffers: Mapping[str, Values], names: Iterable[str], gaze: Gaze, shaded: Shaded) -> None:
-    """Write the channels `names` of all hits into flat `buffers`, at the pixels the hits belong to."""
+def fill(
+    buffers: Mapping[str, Values],
+    names: Iterable[str],
+    gaze: Gaze,
+    shaded: Shaded,
+    some: IntArray | None = None,
+) -> None:
+    """Write the channels `names` of all hits, or of some, into flat `buffers`, at the hits' pixels."""
     for name in names:
         values_of = SOURCES[name].values
         for layer, values in zip(CHANNELS[name].layers, values_of(gaze, shaded), strict=True):
-            shaded.hits.put(buffers[layer], values)
+            shaded.hits.put(buffers[layer], values, some)
 
 
 _SCALE = 2.0**-112

@@ -15,7 +15,7 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.scene import Scene
 from quiltcli.scene.scene import ALPHAS
 from quiltcli.shading.adaptive import Shaded
-from quiltcli.shading.materials import albedo_wants, at_materials
+from quiltcli.shading.materials import albedo_wants, alpha_at, at_materials
 from quiltcli.visibility.draw import Drawing, Wanted
 from quiltcli.visibility.resolve.hits import Points
 
@@ -47,6 +47,7 @@ def opacity_at(scene: Scene, seen: Points) -> Float32Array:
     assert table.alpha is not None
     assert table.cutoff is not None
     (alpha,) = at_materials(scene, table.opacity[:, None], seen.triangle)
+    alpha = alpha * alpha_at(scene, seen)
     if scene.corner_opacities is not None:
         assert seen.weights is not None
         first, second, third = scene.corner_opacities.take(seen.triangle, axis=0).transpose(2, 0, 1)

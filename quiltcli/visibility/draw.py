@@ -18,6 +18,7 @@ from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.projection.planar import QuiltRays
 from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.resolve.footprints import Cells
 from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.layers import LayerHits, layer_hits
 from quiltcli.visibility.resolve.pixels import MixedTiles
@@ -58,6 +59,7 @@ from quiltcli.visibility.setup.prewarp import (
 __all__ = [
     "BlockPairs",
     "Blocks",
+    "Cells",
     "Drawing",
     "Frame",
     "Hits",
@@ -122,6 +124,7 @@ class Drawing:
         limits: how depth is measured.
         bits: bits of the serial in a key.
         soft: pixels that are seen through something, which the canvas has not; None where there are none.
+        cells: the parts of pixels that its samples stand for; None for all of them.
     """
 
     blocks: Blocks
@@ -129,6 +132,7 @@ class Drawing:
     table: PlaneTable
     limits: DepthRange
     bits: int
+    cells: Cells | None = None
     soft: Fragments | None = None
 
     def regions(
@@ -144,7 +148,7 @@ class Drawing:
         return read_canvas(self._reader(wanted, scene), largest)
 
     def _reader(self, wanted: Wanted, scene: Scene | None) -> Reader:
-        return Reader(self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted)
+        return Reader(self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted, self.cells)
 
     def layers(self, light: BoolArray, wanted: Wanted, scene: Scene) -> Iterator[LayerHits]:
         """The pixels that are seen through something, layer by layer from the front.
@@ -199,6 +203,7 @@ def draw(
     frame: Frame,
     batch: tuple[int, int],
     sample: FloatArray | None = None,
+    cells: Cells | None = None,
     *,
     settled: bool = False,
     done: BoolArray | None = None,
@@ -209,6 +214,7 @@ def draw(
         frame: the frame.
         batch: one of `batches(frame)`.
         sample: (F, 2) where in each facet's pixels to look, in pixels from their centres; None for there.
+        cells: the parts of the pixels that the sample stands for; None for all of them.
         settled: whether only microtiles are drawn in which all samples see one triangle.
         done: (m,) microtiles of the batch's blocks that are not drawn.
     """
@@ -250,4 +256,4 @@ def draw(
     draw_large(large, spans, covering, canvas, limits, bits, by)
     # What lies before all that is opaque.
     soft = soft_fragments(pairs, light, table, canvas, limits, bits, by) if light.size else None
-    return Drawing(frame.blocks, canvas, table, limits, bits, soft)
+    return Drawing(frame.blocks, canvas, table, limits, bits, cells, soft)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -101,7 +102,7 @@ def test_the_same_triangles_are_seen_as_without_it(name, samples, settled, monke
                     once[layer].view(np.uint32), each[layer].view(np.uint32), err_msg=layer
                 )
         for layer in ("R", "G", "B", "diffuse.R", "specular.G"):
-            np.testing.assert_allclose(once[layer], each[layer], rtol=0.005, atol=2**-10, err_msg=layer)
+            np.testing.assert_allclose(once[layer], each[layer], rtol=0.01, atol=2**-10, err_msg=layer)
 
 
 def test_two_samples_are_looked_at_one_by_one(settled):
@@ -117,3 +118,21 @@ def test_small_blocks_settle_the_same(monkeypatch):
     cut = drawn(scene, 8, panel(density=70), eye)
     for name, pixels in whole.items():
         np.testing.assert_allclose(cut[name], pixels, rtol=2**-9, atol=2**-11, err_msg=name)
+
+
+def test_many_samples_take_no_more_memory_than_few():
+    peaks = {}
+    for samples in (4, 64):
+        tracemalloc.start()
+        drawn(shiny_ball(), samples, panel(density=60), viewer((0.21, 0.13, 2.9)))
+        peaks[samples] = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert peaks[64] < 1.2 * peaks[4]
+
+
+def test_most_of_a_plain_floor_is_looked_at_once(settled):
+    """What is left for the other samples is the rims of tiles."""
+    scene, eye = tiled_floor(2), viewer((0, 1.5, 2.5))
+    drawn(scene, 4, panel(density=200), eye)
+    shown = np.count_nonzero(np.isfinite(drawn(scene, 1, panel(density=200), eye, ("Z",))["Z"])) / 64
+    assert sum(settled) > 0.8 * shown
