@@ -20,15 +20,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import BoolArray, FloatArray
 from quiltcli.layout import Layout
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.setup import Stage
 from quiltcli.render.sums import Sums, new_sums
 from quiltcli.shading.aovs import shaded_for, wanted_for
 from quiltcli.shading.layers import layers
+from quiltcli.shading.once import may_be_once, shaded_once
 from quiltcli.visibility.draw import Cells, Frame, draw
 
+_WORTH_SETTLING = 3  # samples; fewer are looked at faster one by one
 _LONGEST = 5  # times as wide as high a cell's grid may be
 _TURN = 1e-6  # by which a map's linear part may be off a whole turn
 _LATTICES = {
@@ -86,16 +88,41 @@ def add_samples(
         places: the samples' places in a pixel, from its centre.
     """
     scene, wanted = stage.scene, wanted_for(sums.channels, stage.scene)
+    done = None
+    if len(places) >= _WORTH_SETTLING and frame.order is None and may_be_once(scene):
+        done = _add_settled(stage, frame, batch, sums, len(places))
     for place in places:
         cells = None
         if scene.textures is not None:
             cells = cells_in_quilt(stage.layout, *cell_of(place, stage.job.render.samples))
-        drawing = draw(frame, batch, in_quilt(stage.layout, place), cells)
+        drawing = draw(frame, batch, in_quilt(stage.layout, place), cells, done=done)
         for shaded in shaded_for(sums.channels, drawing, wanted, scene, frame.viewer.eye):
             sums.add(shaded)
         for layer in layers(drawing, wanted, scene, frame.viewer.eye):
             sums.add(layer.shaded, layer.weight)
         drawing.done()
+
+
+def _add_settled(stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums, times: int) -> BoolArray:
+    """Add what all of so many samples see alike: smooth light where one triangle is all they can see.
+
+    The mean of smooth light over a pixel is that of its centre, nearly: it is worked out once for a triangle
+    and pixel, as multisampling does. Where it is not smooth, at glints and shadows' edges, samples are looked
+    at one by one.
+
+    Returns:
+        (m,) the microtiles of the batch's blocks in which nothing is left to be looked at.
+    """
+    scene, blocks = stage.scene, stage.blocks
+    tiles = blocks.tiles(batch)
+    done = np.zeros(tiles.stop - tiles.start, dtype=np.bool_)
+    drawing = draw(frame, batch, settled=True)
+    wanted = wanted_for(sums.channels, scene)
+    for shaded, number in shaded_once(drawing.regions(wanted, scene), scene, frame.viewer.eye):
+        sums.add(shaded, times=times)
+        done[number - tiles.start] = True
+    drawing.done()
+    return done
 
 
 def new_batch_sums(stage: Stage, batch: tuple[int, int], channels: tuple[str, ...]) -> Sums:

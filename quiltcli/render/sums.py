@@ -52,14 +52,17 @@ class Sums:
         """How many addresses there are."""
         return int(self._memory["cover"].size)
 
-    def add(self, shaded: Shaded, weight: Float32Array | None = None) -> None:
+    def add(self, shaded: Shaded, weight: Float32Array | None = None, times: int = 1) -> None:
         """Add what is seen at one sample of some pixels, each of them once.
 
         Args:
             shaded: what is seen.
             weight: (P,) share of the sample's light that comes from there; None for all of it.
+            times: of how many samples this is true.
         """
         pixel = shaded.hits.pixel - self._first
+        if times > 1:
+            weight = np.full(pixel.size, times, dtype=np.float32)
         self._memory["cover"][pixel] += _ONE if weight is None else weight
         for name in self.channels:
             if CHANNELS[name].matte:

@@ -211,10 +211,10 @@ def _shaded_whole(squares: WholeTiles, scene: Scene, eye: FloatArray, cover: int
         yield from (Shaded(scene, eye, hits) for hits in squares.of(~smooth).hits())
 
 
-def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:
+def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray, share: float = 1.0) -> BoolArray:
     """Which squares (S,) have no glint, no shadow's edge and no grazing view in or near them.
 
-    They are seen from an eye (3,).
+    They are seen from an eye (3,); `share` is of the distance that counts as near.
     Light is made of few functions: the lengths of vectors, Schlick's and Smith's of the angle between
     normal and eye or lamp, and GGX's of the angle between normal and half vector, all with poles or
     kinks that are known. What a polynomial misses falls with the third power of the distance to them.
@@ -225,9 +225,9 @@ def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:
     ray, normal = nodes.middle_vectors(rays), nodes.middle_vectors(squares.normal)
     ray_over, normal_over = _over_length(ray), _over_length(normal)
     view, normal = -ray * ray_over, normal * normal_over
-    eye_turn = nodes.vectors_reach(rays) * ray_over
-    normal_turn = nodes.vectors_reach(squares.normal) * normal_over
-    depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse)
+    eye_turn = nodes.vectors_reach(rays) * ray_over * share
+    normal_turn = nodes.vectors_reach(squares.normal) * normal_over * share
+    depth_turn = nodes.reach(squares.inverse) / nodes.middle(squares.inverse) * share
     middle = Middle(squares, eye, view, eye_turn, depth_turn)
     # The view: not grazing; where light or colour changes from place to place, not too steep.
     nv = sum_of_products(normal, view)

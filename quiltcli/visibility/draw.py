@@ -34,6 +34,7 @@ from quiltcli.visibility.scan.displaced import draw_displaced
 from quiltcli.visibility.scan.keys import serial_bits
 from quiltcli.visibility.scan.large import covering_keys, draw_large
 from quiltcli.visibility.scan.order import BatchOrder
+from quiltcli.visibility.scan.settled import REACH, settled_tiles
 from quiltcli.visibility.scan.small import LIMIT, draw_small
 from quiltcli.visibility.scan.soft import Fragments, apart, soft_fragments
 from quiltcli.visibility.scan.spans import large_spans
@@ -129,7 +130,6 @@ class Drawing:
         limits: how depth is measured.
         bits: bits of the serial in a key.
         samples: where the rays of patches go through; None of flat facets.
-        cells: the parts of pixels that its samples stand for; None for all of them.
         soft: pixels that are seen through something, which the canvas has not; None where there are none.
         cells: the parts of pixels that its samples stand for; None for all of them.
     """
@@ -211,7 +211,13 @@ def rasterize(
 
 
 def draw(
-    frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None, cells: Cells | None = None
+    frame: Frame,
+    batch: tuple[int, int],
+    sample: FloatArray | None = None,
+    cells: Cells | None = None,
+    *,
+    settled: bool = False,
+    done: BoolArray | None = None,
 ) -> Drawing:
     """Draw the triangles of one batch.
 
@@ -220,14 +226,18 @@ def draw(
         batch: one of `batches(frame)`.
         sample: (F, 2) where in each facet's pixels to look, in pixels from their centres; None for there.
         cells: the parts of the pixels that the sample stands for; None for all of them.
+        settled: whether only microtiles are drawn in which all samples see one triangle.
+        done: (m,) microtiles of the batch's blocks that are not drawn.
     """
     # What will be drawn on: the batch's microtiles, their rays, and how keys of depth are made.
     counts = frame.pairs.per_block
     block = batch[0] + np.flatnonzero(counts[batch[0] : batch[1]])
     bits = serial_bits(int(counts[block].sum()))
     canvas = new_canvas(block, frame.blocks)
+    if done is not None:
+        canvas.used[done.take(canvas.number - frame.blocks.tiles(batch).start)] = False
     if block.size and block[0] >= frame.blocks.flat:
-        return _draw_patches(frame, canvas, bits, sample, cells)
+        return _draw_patches(frame, canvas, bits, sample, cells, settled=settled)
     rays = ray_matrices(frame.rays.eye_from_quilt, frame.blocks, block, sample)
     viewer = frame.viewer
     limits = DepthRange(
@@ -236,15 +246,21 @@ def draw(
     by = None if frame.order is None else BatchOrder(frame.order, limits, frame.blocks.facet[block])
     # Triangles in homogeneous pixels, small ones apart from large ones.
     matrices = block_matrices(frame.rays, frame.blocks, block, sample)
-    pairs = warp(frame.sight, frame.pairs, frame.blocks, block, matrices)
+    reach = REACH if settled else 0.0
+    pairs = warp(frame.sight, frame.pairs, frame.blocks, block, matrices, reach)
     table = PlaneTable(pairs.triangle.size)
     width, height = pairs.box[1] - pairs.box[0], pairs.box[3] - pairs.box[2]
     some = np.minimum(width, height) >= 0
     light = np.zeros(0, dtype=np.int64)
-    if frame.sight.soft is not None:
+    if frame.sight.soft is not None and not settled:
         some, light = apart(pairs, frame.sight.soft, some)
     small = np.maximum(width, height) < LIMIT
     large = table.add(pairs, np.flatnonzero(some & ~small)).compact()
+    if settled:
+        opaque = np.ones(len(frame.sight.triangles), dtype=np.bool_)
+        if frame.sight.soft is not None:
+            opaque &= ~frame.sight.soft
+        canvas.used[:] &= settled_tiles(pairs, np.flatnonzero(some & small), large, opaque, canvas)
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
     spans = large_spans(large, canvas, by)
     covering = covering_keys(large, spans, canvas, bits) if by is None else None
@@ -257,9 +273,15 @@ def draw(
 
 
 def _draw_patches(
-    frame: Frame, canvas: Canvas, bits: int, sample: FloatArray | None, cells: Cells | None
+    frame: Frame,
+    canvas: Canvas,
+    bits: int,
+    sample: FloatArray | None,
+    cells: Cells | None,
+    *,
+    settled: bool,
 ) -> Drawing:
-    """Draw the triangles of a batch of patches; for the arguments see `draw`."""
+    """Draw the triangles of a batch of patches, none of which is settled; for the arguments see `draw`."""
     rays, patches, viewer, block = frame.rays, frame.patches, frame.viewer, canvas.block
     assert patches is not None
     assert rays.patched is not None
@@ -278,6 +300,9 @@ def _draw_patches(
     inverse[:, 1] -= (beside[1] + LATTICE[1])[:, None] * inverse[:, 2]
     pairs = warp(frame.sight, frame.pairs, frame.blocks, block, inverse, samples.reach)
     table = PlaneTable(pairs.triangle.size)
+    if settled:
+        canvas.used[:] = False
+        return Drawing(frame.blocks, canvas, table, limits, bits)
     some = np.flatnonzero((pairs.box[1] >= pairs.box[0]) & (pairs.box[3] >= pairs.box[2]))
     planes = table.add(pairs, some, DISPLACED).compact()
     draw_displaced(planes, canvas, samples, limits, bits)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from quiltcli.formats.exr.image import read_exr
 from quiltcli.job import load_job
@@ -18,7 +20,7 @@ from quiltcli.render.setup import set_stage
 from quiltcli.scene import Materials
 from quiltcli.scene.scene import ALPHAS
 from tests.helpers.ball_setup import ball_scene, stage_of_facets
-from tests.helpers.gltf_files import one_square
+from tests.helpers.gltf_files import SQUARE, one_square
 from tests.helpers.in_memory import cube, panel, viewer
 from tests.helpers.tiny_job import replaced, write_tiny_job
 from tests.helpers.wall_scene import lights
@@ -328,3 +330,48 @@ def test_rays_see_what_is_visible(tmp_path):
             how = stage.job.render.model_copy(update={"method": method})
             buffers = picture(replace(stage, job=stage.job.model_copy(update={"render": how})))
             assert np.isfinite(buffers["Z"]).any() == (opacity > 0)
+
+
+def leaf_job(tmp_path, mode, alphas):
+    """The square with a picture of two columns, red, of these alphas from left to right."""
+    data = io.BytesIO()
+    Image.fromarray(np.array([[(255, 0, 0, alpha) for alpha in alphas]], np.uint8)).save(data, "PNG")
+    file = one_square()
+    image = file.add("images", bufferView=file.view(data.getvalue()), mimeType="image/png")
+    sampler = file.add("samplers", wrapS=33071, wrapT=33071)
+    file.json["textures"] = [{"source": image, "sampler": sampler}]
+    look = {"baseColorTexture": {"index": 0}}
+    unlit = {"KHR_materials_unlit": {}}
+    file.json["materials"] = [{"alphaMode": mode, "pbrMetallicRoughness": look, "extensions": unlit}]
+    primitive = file.json["meshes"][0]["primitives"][0]
+    primitive["material"] = 0
+    corners = np.array(SQUARE, np.float32)[:, :2]
+    primitive["attributes"]["TEXCOORD_0"] = file.accessor(corners)
+    file.write(tmp_path / "leaf.glb")
+    job = write_tiny_job(tmp_path, "160, 80")
+    place = "transform: {translate: [-0.5, -0.5, -0.5]}"
+    replaced(tmp_path, "scene.yaml", "mesh: ball.obj", f"mesh: leaf.glb, {place}")
+    replaced(tmp_path, "scene.yaml", ", material: {color: [0.8, 0.2, 0.1]}", "")
+    replaced(tmp_path, "job.yaml", "frames: 1-4", "frames: 1-4\noutput: {channels: [rgba, Z, uv]}")
+    return set_stage(load_job(job))
+
+
+def test_a_mask_is_cut_out_by_its_picture(tmp_path):
+    """Alpha runs from 0 to 1 between the columns' middles: half of the leaf is there."""
+    buffers = picture(leaf_job(tmp_path, "MASK", (0, 255)))
+    seen = np.isfinite(buffers["Z"])
+    assert set(np.unique(buffers["A"])) == {0, 1}
+    np.testing.assert_array_equal(seen, buffers["A"] > 0)
+    assert buffers["uv.U"][seen].min() > 0.45
+    assert buffers["uv.U"][seen].max() > 0.95
+
+
+def test_a_picture_blends_and_what_it_leaves_out_has_no_depth(tmp_path):
+    buffers = picture(leaf_job(tmp_path, "BLEND", (0, 128)))
+    seen = np.isfinite(buffers["Z"])
+    assert buffers["A"].max() == pytest.approx(128 / 255, abs=1e-3)
+    assert buffers["uv.U"][seen].min() > 0.2, "where alpha is 0 nothing is"
+    u = buffers["uv.U"][seen].astype(float)
+    expected = np.clip((u - 0.25) / 0.5, 0, 1) * 128 / 255
+    np.testing.assert_allclose(buffers["A"][seen], expected, atol=0.03)
+    np.testing.assert_allclose(buffers["R"][seen], buffers["A"][seen], atol=1e-3)
