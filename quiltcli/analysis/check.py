@@ -38,6 +38,7 @@ from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
+from quiltcli.shading.lights import demand_shadows
 from quiltcli.viewer.view import facet_problems, view_problems
 
 T = TypeVar("T")
@@ -106,6 +107,8 @@ class _Findings:
         else:
             scene, source = self.run(load_moving_scene, spec, float(job.fps)) or (None, None)
             self.problems += source.problems(job.frames) if source is not None else ()
+            if scene is not None and job.render.shadows:
+                self.run(demand_shadows, scene)
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
         return scene

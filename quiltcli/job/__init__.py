@@ -19,6 +19,7 @@ from quiltcli.job.layout import (
     read_aspect,
 )
 from quiltcli.job.lengths import UNITS
+from quiltcli.job.lights import AmbientLight, AreaLight, DirectionalLight, LightSpec, PointLight, SpotLight
 from quiltcli.job.load import (
     check_file,
     file_kind,
@@ -29,15 +30,7 @@ from quiltcli.job.load import (
     pack_spec,
 )
 from quiltcli.job.recorded import FilterSpec, GapsSpec, MarkerSpec, RecordedSpec
-from quiltcli.job.scene import (
-    AmbientLight,
-    DirectionalLight,
-    LightSpec,
-    MaterialSpec,
-    ObjectSpec,
-    PointLight,
-    SceneFile,
-)
+from quiltcli.job.scene import MaterialSpec, ObjectSpec, SceneFile
 from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, ViewerSpec
 
 __all__ = [
@@ -46,6 +39,7 @@ __all__ = [
     "PACKING_METHODS",
     "UNITS",
     "AmbientLight",
+    "AreaLight",
     "CsvSpec",
     "DirectionalLight",
     "DisplayFile",
@@ -71,6 +65,7 @@ __all__ = [
     "RenderSpec",
     "ResolutionSpec",
     "SceneFile",
+    "SpotLight",
     "TransformSpec",
     "UvLayoutSpec",
     "ViewerSpec",

@@ -116,6 +116,8 @@ class RenderSpec(Model):
     planar where depth is planar and every lit pixel of every frame lies ahead of the eye (auto)."""
     backface_culling: bool = False
     """Drop triangles that face away from the viewer."""
+    shadows: bool = True
+    """Draw the shadows of lights that have them."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
 

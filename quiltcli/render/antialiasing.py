@@ -22,6 +22,7 @@ from quiltcli.layout import Layout
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.setup import Stage
 from quiltcli.shading.aovs import light_at_points, shaded_for, wanted_for
+from quiltcli.shading.shadows import Sample
 from quiltcli.visibility.draw import Frame, draw
 
 _TURN = 1e-6  # by which a map's linear part may be off a whole turn
@@ -70,9 +71,10 @@ def draw_samples(
     sums = _Sums(stage, batch, channels)
     scene, eye = stage.scene, frame.viewer.eye
     count = stage.job.render.samples
-    for sample in sample_places(count):
+    for number, sample in enumerate(sample_places(count)):
         drawing = draw(frame, batch, in_quilt(stage.layout, sample))
-        for shaded in shaded_for(channels, drawing, wanted_for(channels, scene), scene, eye):
+        wanted = wanted_for(channels, scene)
+        for shaded in shaded_for(channels, drawing, wanted, scene, eye, Sample(number, count)):
             pixel = shaded.hits.pixel - sums.first
             sums.hits[pixel] += 1
             for name in channels:

@@ -13,13 +13,14 @@ from quiltcli.display import Facets, load_display
 from quiltcli.errors import JobError, SceneError, raise_all
 from quiltcli.geometry import OwnerArray
 from quiltcli.images.names import layout_path
-from quiltcli.job import JobFile, PackSpec, load_display_file, load_scene_file
+from quiltcli.job import JobFile, PackSpec, SceneFile, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.scene import Scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
+from quiltcli.shading.lights import demand_shadows
 from quiltcli.viewer.clip import settled_clip
 from quiltcli.viewer.view import View, facet_problems, views_of
 from quiltcli.visibility.binning.pairs import Parts, facet_parts
@@ -82,15 +83,23 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
         folder: output folder instead of the job's; the layout of an earlier run is kept there.
 
     Raises:
-        QuiltError: a file is wrong, or the layout does not belong to the display.
+        QuiltError: a file is wrong, the layout does not belong to the display, or there is no Embree for
+            shadows.
     """
     kept = layout_path(folder or job.output.directory)
     facets = load_display(load_display_file(job.display))
     raise_all(JobError, facet_problems(job, facets.count))
     layout = layout_for(job.layout or PackSpec(), facets, kept)
     demand_memory(job, layout)
-    scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))
+    scene, source = load_moving_scene(scene_spec(job), float(job.fps))
+    demand_shadows(scene)
     return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)
+
+
+def scene_spec(job: JobFile) -> SceneFile:
+    """The scene file of a job, as the job wants it drawn."""
+    spec = load_scene_file(job.scene)
+    return spec if job.render.shadows else spec.without_shadows()
 
 
 def stage_of(job: JobFile, facets: Facets, layout: Layout, scene: Scene, bleed: int) -> Stage:

@@ -47,6 +47,7 @@ from quiltcli.render.crew import Threads, plan_of
 from quiltcli.render.setup import Stage
 from quiltcli.render.shared import SharedArrays
 from quiltcli.render.workplace import Fault, Item, Moved, Task, Workplace, serve
+from quiltcli.shading.lights import prepare_shadows
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import (
@@ -147,6 +148,7 @@ class Pool:
         _ = stage.scene.planes, stage.scene.corner_normals, stage.scene.corner_colors
         if stage.job.render.backface_culling:
             _ = stage.scene.facing
+        prepare_shadows(stage.scene)
         self._workers: list[_Worker] = []
         self._known: list[set[int]] = [set() for _ in range(workers)]
         # Python waits at its end for children that are left, and these are deaf to its signal to end.

@@ -58,6 +58,7 @@ class Scene:
         notices: sentences to tell the user once: what was dropped or assumed.
         uv: (V, 2) texture coordinates, v up, NaN where there are none; None when there are none at all.
         coverage: how the areas of the files' polygons compare with those of their triangles.
+        lets_light_by: objects that cast no shadows, indices into `objects`.
     """
 
     vertices: FloatArray
@@ -74,6 +75,7 @@ class Scene:
     notices: tuple[str, ...]
     uv: FloatArray | None = None
     coverage: Coverage = NOTHING
+    lets_light_by: tuple[int, ...] = ()
 
     @cached_property
     def planes(self) -> FloatArray:

@@ -3,23 +3,28 @@
 Across a few pixels of one triangle light hardly ever changes in a way that a polynomial of second degree
 cannot follow. Where that is sure, colours are worked out at the nine nodes alone, and the polynomial
 between them is closer to the others than half floats can tell. Everything else is shaded pixel by pixel.
+
+A shadow is never smooth: what share of a lamp is seen is asked pixel by pixel, and multiplies the light
+of that lamp between the nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, FloatArray
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.scene import Scene
 from quiltcli.shading.brdf import alpha
-from quiltcli.shading.lights import Middle, asks_for_places, turns
+from quiltcli.shading.lights import Middle, asks_for_places, casting, reaches, turns
 from quiltcli.shading.materials import albedo_at, vertex_colors
 from quiltcli.shading.nodes import NodeColors, nodes_of, points_at_nodes
-from quiltcli.shading.shade import Light, Shades, filled, shade, shade_apart
+from quiltcli.shading.shade import Lamps, Light, Shades, all_lamps, filled, shade, shade_apart
+from quiltcli.shading.shadows import CENTRE, Sample, Shadows, casts
+from quiltcli.shading.surface import Surface
 from quiltcli.visibility.draw import Hits, MixedTiles, Region, WholeTiles
 from quiltcli.visibility.resolve.vectors import sum_of_products
 
@@ -36,22 +41,49 @@ _FLOOR = 1 / 64
 
 @dataclass(frozen=True)
 class NodeLight:
-    """Light at the nodes of S squares in which it is smooth, worked out when it is first asked for."""
+    """Light at the nodes of S squares in which it is smooth, worked out when it is first asked for.
+
+    Attributes:
+        scene: what is seen.
+        eye: (3,) from where, world metres.
+        squares: the squares.
+        lamps: whose light; by default of all that cast no shadows, and of what emits.
+    """
 
     scene: Scene
     eye: FloatArray
     squares: WholeTiles
 
+    lamps: Lamps | None = None
+
     @cached_property
     def total(self) -> NodeColors:
-        """All of it."""
-        return self._of(shade(self.scene, self.eye, points_at_nodes(self.squares)))
+        """All of it, but for lamps that cast shadows."""
+        points = points_at_nodes(self.squares)
+        return self._of(shade(self.scene, self.eye, points, self._lamps))
 
     @cached_property
     def apart(self) -> Light[NodeColors]:
         """Its parts."""
-        light = shade_apart(self.scene, self.eye, points_at_nodes(self.squares))
+        light = shade_apart(self.scene, self.eye, points_at_nodes(self.squares), self._lamps)
         return Light(self._of(light.diffuse), self._of(light.specular), self._of(light.emission))
+
+    @property
+    def _lamps(self) -> Lamps:
+        others = tuple(light for light in self.scene.lights if not casts(light))
+        return self.lamps or Lamps(others)
+
+    @cached_property
+    def cast(self) -> tuple[NodeLight, ...]:
+        """The light of each lamp that casts shadows, if nothing hid it."""
+        return tuple(replace(self, lamps=Lamps((light,), emits=False)) for light in casting(self.scene))
+
+    @cached_property
+    def reached(self) -> BoolArray:
+        """Which squares (S,) the first lamp reaches, if nothing hides it."""
+        surface = Surface(points_at_nodes(self.squares), self.eye)
+        found = reaches(self._lamps.lights[0], surface)
+        return np.broadcast_to(found, self.squares.triangle.shape)
 
     def _of(self, colors: Shades) -> NodeColors:
         nodes = nodes_of(self.squares.side)
@@ -71,6 +103,7 @@ class Shaded:
         hits: its visible points.
         nodes: the light of squares, of which these hits are a part; None where light is not smooth.
         part: which of the squares.
+        sample: which sample of its pixels they are.
     """
 
     scene: Scene
@@ -78,13 +111,16 @@ class Shaded:
     hits: Hits
     nodes: NodeLight | None = None
     part: slice = field(default_factory=lambda: slice(None))
+    sample: Sample = CENTRE
 
     @property
     def total(self) -> NodeColors | Shades:
         """All light, at nodes or at points."""
-        if self.nodes is not None:
-            return self.nodes.total[self.part]
-        return shade(self.scene, self.eye, self.hits.points)
+        if self.nodes is None:
+            return shade(self.scene, self.eye, self.hits.points, all_lamps(self.scene, self.sample))
+        base = self.nodes.total[self.part]
+        cast = [lamp.total[self.part] for lamp in self.nodes.cast]
+        return self._with_shadows(base, cast) if cast else base
 
     def pixels(self) -> Shades:
         """All light, at points."""
@@ -95,9 +131,41 @@ class Shaded:
     def apart(self) -> Light[NodeColors] | Light[Shades]:
         """The light's parts, at nodes or at points."""
         if self.nodes is None:
-            return shade_apart(self.scene, self.eye, self.hits.points)
+            return shade_apart(self.scene, self.eye, self.hits.points, all_lamps(self.scene, self.sample))
         light, part = self.nodes.apart, self.part
-        return Light(light.diffuse[part], light.specular[part], light.emission[part])
+        base = Light(light.diffuse[part], light.specular[part], light.emission[part])
+        if not self.nodes.cast:
+            return base
+        cast = [lamp.apart for lamp in self.nodes.cast]
+        return Light(
+            self._with_shadows(base.diffuse, [light.diffuse[part] for light in cast]),
+            self._with_shadows(base.specular, [light.specular[part] for light in cast]),
+            tuple(base.emission.pixels()),
+        )
+
+    def _with_shadows(self, base: NodeColors, cast: Sequence[NodeColors]) -> Shades:
+        """Light of which nothing is hidden, and what is shown of each lamp, at points."""
+        count = max(len(light.values) for light in (base, *cast))
+        total = [*base.pixels()] * (count // len(base.values))
+        for light, shown in zip(cast, self._shown, strict=True):
+            colors = light.pixels()
+            for k in range(count):
+                total[k] = total[k] + colors[k % len(colors)] * shown
+        return tuple(total)
+
+    @cached_property
+    def _shown(self) -> tuple[Float32Array, ...]:
+        """The share of each lamp that points see."""
+        assert self.nodes is not None
+        shadows = Shadows(self.scene, Surface(self.hits.points, self.eye), self.sample)
+        drawn = np.ones(self.hits.depth.shape, dtype=np.bool_)
+        if self.hits.chosen is not None:
+            drawn[:] = False
+            drawn.reshape(-1)[self.hits.chosen] = True
+        return tuple(
+            shadows.shown(light, lamp.reached[self.part][:, None] & drawn)
+            for light, lamp in zip(casting(self.scene), self.nodes.cast, strict=True)
+        )
 
     @property
     def albedo(self) -> Shades:
@@ -105,26 +173,28 @@ class Shaded:
         return filled(albedo_at(self.scene, self.hits.points), self.hits.points)
 
 
-def shaded(regions: Iterable[Region], scene: Scene, eye: FloatArray) -> Iterator[Shaded]:
+def shaded(
+    regions: Iterable[Region], scene: Scene, eye: FloatArray, sample: Sample = CENTRE
+) -> Iterator[Shaded]:
     """The hits of all regions, with light at nodes where it is smooth.
 
     A square in which it is not is looked at by microtiles, a microtile pixel by pixel.
     """
     for region in regions:
         if isinstance(region, MixedTiles):
-            yield from (Shaded(scene, eye, hits) for hits in region.hits())
+            yield from (Shaded(scene, eye, hits, sample=sample) for hits in region.hits())
             continue
         # Light at nine nodes a square where these tell enough of it.
         smooth = is_smooth(region, scene, eye)
         some = region.of(smooth)
         nodes = NodeLight(scene, eye, some)
         for part in some.parts():
-            yield Shaded(scene, eye, some[part].read(), nodes, part)
+            yield Shaded(scene, eye, some[part].read(), nodes, part, sample)
         # What is left: smaller squares, or if there are none, pixels.
         if region.side > 1:
-            yield from shaded(region.split(~smooth), scene, eye)
+            yield from shaded(region.split(~smooth), scene, eye, sample)
         else:
-            yield from (Shaded(scene, eye, hits) for hits in region.of(~smooth).hits())
+            yield from (Shaded(scene, eye, hits, sample=sample) for hits in region.of(~smooth).hits())
 
 
 def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:

@@ -3,24 +3,26 @@
     surface → material → lights → sum
 
 `surface` says how a point lies to the eye, `materials` and `brdf` what it is made of and how that reflects,
-`lights` what arrives there. Nothing casts a shadow and light is not passed on from surface to surface.
+`lights` what arrives there, `shadows` what of that is hidden. Light is not passed on from surface to surface.
 Every sum is written out in a fixed order of single-precision operations, so a pixel's value depends
 neither on the machine nor on which other pixels are shaded with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray
+from quiltcli.scene import Light as Lamp
 from quiltcli.scene import Scene
 from quiltcli.shading.brdf import Layer, Lobes, glints, layer_of, let_in_and_out, lobes_at
-from quiltcli.shading.lights import Arrival, arrivals, asks_for_places
+from quiltcli.shading.lights import Arrival, arrivals, asks_for_places, casting
 from quiltcli.shading.materials import Colors, Values, albedo_wants, lit_at
+from quiltcli.shading.shadows import Sample, Shadows
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.resolve.hits import Points, Wanted
 
@@ -52,10 +54,36 @@ class Light(Generic[Kind]):
 def shading_wants(scene: Scene) -> Wanted:
     """What shading asks of hits."""
     wanted = Wanted.NORMAL | albedo_wants(scene)
+    if casting(scene):
+        wanted |= Wanted.POSITION | Wanted.WEIGHTS
     return wanted | Wanted.POSITION if asks_for_places(scene) else wanted
 
 
-def shade(scene: Scene, eye: FloatArray, seen: Points) -> Shades:
+@dataclass(frozen=True)
+class Lamps:
+    """Some of a scene's light: that of some lamps, and what needs none.
+
+    Attributes:
+        lights: the lamps.
+        emits: whether what surfaces give off by themselves is part of it.
+        sample: the sample of a pixel that points are, for shadows; None where nothing is hidden.
+    """
+
+    lights: Sequence[Lamp]
+    emits: bool = True
+    sample: Sample | None = None
+
+    def shadows(self, scene: Scene, surface: Surface) -> Shadows | None:
+        """What is hidden of the lamps at surfaces."""
+        return None if self.sample is None else Shadows(scene, surface, self.sample)
+
+
+def all_lamps(scene: Scene, sample: Sample | None = None) -> Lamps:
+    """All light of a scene, shadows in it."""
+    return Lamps(scene.lights, sample=sample or Sample())
+
+
+def shade(scene: Scene, eye: FloatArray, seen: Points, lamps: Lamps | None = None) -> Shades:
     """All light of points, linear, summed up lamp by lamp.
 
     Of what is grey at all points there is one array, not three.
@@ -64,13 +92,16 @@ def shade(scene: Scene, eye: FloatArray, seen: Points) -> Shades:
         scene: the scene.
         eye: (3,) world metres.
         seen: n groups of k visible points, with what `shading_wants` asks for.
+        lamps: of which of the scene's light; of all by default.
     """
+    lamps = lamps or all_lamps(scene)
     surface, lobes = Surface(seen, eye), lobes_at(scene, seen)
-    base, total = lobes.base, list(lobes.emission)
-    if _is_grey(base) and _is_grey(lobes.emission) and all(_is_grey(light.color) for light in scene.lights):
+    base, total = lobes.base, list(lobes.emission) if lamps.emits else _nothing()
+    if _is_grey(base) and _is_grey(total) and all(_is_grey(light.color) for light in lamps.lights):
         base, total = base[:1], total[:1]
     layer = layer_of(surface, lobes, base)
-    for arrival in arrivals(scene, surface, to_eye=layer is not None):
+    shadows = lamps.shadows(scene, surface)
+    for arrival in arrivals(lamps.lights, surface, shadows, to_eye=layer is not None):
         for k, part, glint in _reflected(lobes, base, layer, arrival):
             if glint is not None:
                 part = np.add(part, glint, out=_into(part, glint))
@@ -78,23 +109,26 @@ def shade(scene: Scene, eye: FloatArray, seen: Points) -> Shades:
     return filled(total, seen)
 
 
-def shade_apart(scene: Scene, eye: FloatArray, seen: Points) -> Light[Shades]:
+def shade_apart(scene: Scene, eye: FloatArray, seen: Points, lamps: Lamps | None = None) -> Light[Shades]:
     """The light of points, kept apart by how it came about; for the arguments see `shade`.
 
     The colour of the base is left out of diffuse light: what is left is smooth where light is, however
     the colour varies.
     """
+    lamps = lamps or all_lamps(scene)
     surface, lobes = Surface(seen, eye), lobes_at(scene, seen)
     layer = layer_of(surface, lobes, lobes.base)
     white = (lit_at(scene, seen),) * 3
     bare = replace(lobes, paint=white, tint=None)
     diffuse, specular = _nothing(), _nothing()
-    for arrival in arrivals(scene, surface, to_eye=layer is not None):
+    shadows = lamps.shadows(scene, surface)
+    for arrival in arrivals(lamps.lights, surface, shadows, to_eye=layer is not None):
         for k, part, glint in _reflected(bare, white, layer, arrival):
             diffuse[k] = diffuse[k] + part
             if glint is not None:
                 specular[k] = specular[k] + glint
-    return Light(filled(diffuse, seen), filled(specular, seen), filled(lobes.emission, seen))
+    emission = lobes.emission if lamps.emits else _nothing()
+    return Light(filled(diffuse, seen), filled(specular, seen), filled(emission, seen))
 
 
 def _reflected(
@@ -115,11 +149,22 @@ def _reflected(
     received: Float32Array = arrival.received
     reflected: tuple[Float32Array | None, ...] = (None,) * len(base)
     if layer is not None:
-        assert arrival.vl is not None
-        reflected = glints(layer, arrival.nl, arrival.vl, received, arrival.color, out=arrival.vl)
+        reflected = _glints(layer, arrival, received)
         received = let_in_and_out(layer, arrival.nl, received)
     for k, glint in enumerate(reflected):
         yield k, received * (arrival.color[k] * base[k] * lobes.diffuse), glint
+
+
+def _glints(layer: Layer, arrival: Arrival, received: Float32Array) -> tuple[Float32Array, ...]:
+    """What a layer reflects of a lamp."""
+    assert arrival.vl is not None
+    assert arrival.nl is not None
+    image = arrival.image
+    if image is None:
+        return glints(layer, arrival.nl, arrival.vl, received, arrival.color, out=arrival.vl)
+    # As bright as a wider layer's, as sharp as its own.
+    received = image.received * (layer.alpha2 / (layer.alpha2 + image.spread))
+    return glints(layer, image.nl, image.vl, received, arrival.color, out=image.vl)
 
 
 def _into(part: Values, other: Values) -> Float32Array | None:
@@ -127,7 +172,7 @@ def _into(part: Values, other: Values) -> Float32Array | None:
     return part if isinstance(part, np.ndarray) and part.size >= np.size(other) else None
 
 
-def _is_grey(color: Colors | Float32Array) -> bool:
+def _is_grey(color: Sequence[Values] | Float32Array) -> bool:
     """Whether three values are one number."""
     red = color[0]
     return all(isinstance(value, np.float32) and value == red for value in color)
