@@ -22,15 +22,14 @@ from quiltcli.formats.yaml.source import parse_yaml
 from quiltcli.images.names import layout_path
 from quiltcli.job import (
     JobFile,
-    LayoutFile,
     PackSpec,
     SceneFile,
     check_file,
     file_kind,
     load_display_file,
-    load_layout_file,
     load_scene_file,
 )
+from quiltcli.job.layout_table import LayoutTable, read_layout_table
 from quiltcli.job.model import attach
 from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
@@ -135,18 +134,19 @@ def _check_scene(findings: _Findings, path: Path) -> None:
 
 def _check_layout(findings: _Findings, path: Path) -> None:
     layout = findings.run(read_layout, path)
-    facets = _display_of(findings, load_layout_file(path))
+    facets = _display_of(findings, read_layout_table(path))
     findings.run(align, layout, facets)
 
 
-def _display_of(findings: _Findings, layout: LayoutFile) -> Facets | None:
+def _display_of(findings: _Findings, layout: LayoutTable) -> Facets | None:
     """The display a layout says it was made for, if it says so."""
-    if layout.display is None:
+    display = layout.head.display
+    if display is None:
         return None
-    if is_regular(layout.display):
-        return findings.facets(layout.display)
-    what = "is a directory (expected a display file)" if layout.display.is_dir() else "no such file"
-    findings.problems.append(layout.source.problem("display", f"{what}: {layout.display}"))
+    if is_regular(display):
+        return findings.facets(display)
+    what = "is a directory (expected a display file)" if display.is_dir() else "no such file"
+    findings.problems.append(layout.source.problem(["display"], f"{what}: {display}"))
     return None
 
 

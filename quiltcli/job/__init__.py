@@ -4,6 +4,7 @@ Load a file and every problem in it comes in one `JobError`; every model and par
 `source`, whose `problem(key, message)` points into the file when a later stage finds something.
 """
 
+from quiltcli.job.check import check_file
 from quiltcli.job.digest import file_sha256, job_sha256
 from quiltcli.job.display import DisplayFile, FacetSpec, PanelSpec, ResolutionSpec, TransformSpec
 from quiltcli.job.dump import dump_job, dump_yaml
@@ -21,7 +22,6 @@ from quiltcli.job.layout import (
 from quiltcli.job.lengths import UNITS
 from quiltcli.job.lights import AmbientLight, AreaLight, DirectionalLight, LightSpec, PointLight, SpotLight
 from quiltcli.job.load import (
-    check_file,
     file_kind,
     load_display_file,
     load_job,

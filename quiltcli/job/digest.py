@@ -18,7 +18,8 @@ from quiltcli.job.layout_table import places_sha256, read_layout_table
 from quiltcli.job.load import load_display_file, load_scene_file
 from quiltcli.job.model import YAMLS
 
-_PACKING = 1  # to be raised when the same wishes come to another layout than before
+_PACKING = {"net": 2}
+"""Raised from 1 where a method comes to another layout than before from the same wishes."""
 
 
 def job_sha256(job: JobFile) -> str:
@@ -45,7 +46,7 @@ def job_sha256(job: JobFile) -> str:
 
 def wishes_sha256(wishes: PackSpec) -> str:
     """Hash of how to pack, hexadecimal; facets that are to stay count by the places their file gives them."""
-    data = {**plain(wishes, str), "packing": _PACKING}
+    data = {**plain(wishes, str), "packing": _PACKING.get(wishes.method, 1)}
     if wishes.pins is not None:
         data["pins"] = places_sha256(read_layout_table(wishes.pins))
     return _text_sha256(data)

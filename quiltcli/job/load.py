@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,7 +11,8 @@ from pydantic import ValidationError
 
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.inputs import check_input
-from quiltcli.formats.yaml.source import Source, YamlFile, parse_yaml
+from quiltcli.formats.yaml.source import Source, YamlFile, parse_text, parse_yaml
+from quiltcli.formats.yaml.syntax import read_text
 from quiltcli.job.display import DisplayFile
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import LayoutFile, PackSpec
@@ -21,6 +23,7 @@ from quiltcli.job.scene import ObjectSpec, SceneFile
 
 M = TypeVar("M", bound=FileModel)
 T = TypeVar("T")
+_FIRST_KEY = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\n)*(\w+):")
 MODELS: dict[str, type[FileModel]] = {m.kind: m for m in (DisplayFile, LayoutFile, SceneFile, JobFile)}
 
 
@@ -83,8 +86,8 @@ def load_job(path: Path | str, sets: Sequence[str] = ()) -> JobFile:
         # A default directory, too, is relative to the job and not to where quilt was started.
         output.setdefault("directory", "out")
     job = _load(JobFile, found)
-    problems, display = _try(load_display_file, job.display)
-    problems += _try(load_scene_file, job.scene)[0] if job.scene.suffix.lower() in YAMLS else []
+    problems, display = tried(load_display_file, job.display)
+    problems += tried(load_scene_file, job.scene)[0] if job.scene.suffix.lower() in YAMLS else []
     if problems or display is None:
         raise JobError(problems)
     if job.layout is None:
@@ -111,28 +114,18 @@ def file_kind(path: Path | str) -> str:
     Raises:
         JobError: it is none of them.
     """
-    found = parse_yaml(path)
+    text = read_text(Path(path))
+    # A layout may be long: its first line is enough, for whoever reads it finds what is wrong.
+    if (first := _FIRST_KEY.match(text)) and first[1] == LayoutFile.kind:
+        return LayoutFile.kind
+    found = parse_text(text, Path(path))
     kinds = [key for key in found.data if key in KINDS]
     if not kinds:
         raise JobError(found.source.problem((), NO_KIND))
     return str(kinds[0])
 
 
-def check_file(path: Path | str) -> list[Problem]:
-    """Every problem of a YAML file, and of the YAML files a job names; none when all is well."""
-    try:
-        kind = file_kind(path)
-    except JobError as error:
-        return list(error.problems)
-    if kind != JobFile.kind:
-        return _try(lambda p: _load(MODELS[kind], parse_yaml(p)), Path(path))[0]
-    problems, job = _try(load_job, Path(path))
-    if job is not None and isinstance(job.layout, Path):
-        problems += _try(load_layout_file, job.layout)[0]
-    return problems
-
-
-def _try(load: Callable[[Path], T], path: Path) -> tuple[list[Problem], T | None]:
+def tried(load: Callable[[Path], T], path: Path) -> tuple[list[Problem], T | None]:
     """Problems of loading a file, and what was loaded."""
     try:
         return [], load(path)

@@ -8,12 +8,12 @@ import numpy as np
 
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import LayoutError, Problem, raise_all
-from quiltcli.geometry import FloatArray, Int32Array, offsets
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, segments, some_rows
 from quiltcli.layout.check import check_layout
 from quiltcli.layout.layout import PIXEL_TOLERANCE, Layout
 
-# Facet raster → quilt by turning the picture clockwise 0, 1, 2, 3 quarter turns; y runs down.
 _FARTHEST = 1e9  # pixels
+# Facet raster → quilt by turning the picture clockwise 0, 1, 2, 3 quarter turns; y runs down.
 QUARTER_TURNS: FloatArray = np.array(
     [[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]], dtype=np.float64
 )
@@ -62,29 +62,28 @@ def layout_from_polygons(
     Raises:
         LayoutError: facets whose polygon is not an affine picture of the facet, all together.
     """
-    problems = []
-    fits = []
-    pixels = corner_pixels(facets)
     rows = np.flatnonzero(facets.enabled & (page >= 0))
-    for row in rows:
-        corners = slice(int(facets.corner_start[row]), int(facets.corner_start[row + 1]))
-        try:
-            fits.append(_fit(facets, int(row), pixels[corners], quilt[corners]))
-        except _BentError as bent:
-            name = f" ({facets.names[row]})" if facets.names[row] else ""
-            problems.append(Problem(f"facet {row + 1}{name}: {bent}", file=facets.path))
-    raise_all(LayoutError, problems)
-    count = np.array([len(fit.polygon) for fit in fits], dtype=np.int64)
+    start, kept = some_rows(facets.corner_start, rows)
+    # Whatever is wrong, the numbers of the other facets stand.
+    with np.errstate(all="ignore"):
+        fit = _affine(corner_pixels(facets)[kept], quilt[kept], start)
+    wrong = np.flatnonzero(fit.fault).tolist()
+    raise_all(LayoutError, [_bent(facets, int(rows[at]), fit, at) for at in wrong])
+    size, turn, corner, polygon = _rasters(quilt[kept], start, fit.linear)
+    inverse = _inverse(fit.linear)
+    begin = _product(inverse, (corner - fit.offset)[:, :, None])[:, :, 0]
+    steps = _product(inverse, turn)
+    axes = np.stack((facets.du[rows], facets.dv[rows]), axis=1)
     return Layout(
         facet=(rows + 1).astype(np.int32),
         page=page[rows].astype(np.int32),
-        size=np.array([fit.size for fit in fits], dtype=np.int32).reshape(-1, 2),
-        quilt_from_facet=np.array([fit.quilt_from_facet for fit in fits]).reshape(-1, 2, 3),
-        origin=np.array([fit.origin for fit in fits]).reshape(-1, 3),
-        du=np.array([fit.du for fit in fits]).reshape(-1, 3),
-        dv=np.array([fit.dv for fit in fits]).reshape(-1, 3),
-        corner_start=offsets(count),
-        polygon=np.concatenate([np.zeros((0, 2)), *(fit.polygon for fit in fits)]),
+        size=size,
+        quilt_from_facet=np.concatenate((turn, corner[:, :, None]), axis=2),
+        origin=facets.origin[rows] + _product(begin[:, None, :], axes)[:, 0],
+        du=_product(steps[:, None, :, 0], axes)[:, 0],
+        dv=_product(steps[:, None, :, 1], axes)[:, 0],
+        corner_start=start,
+        polygon=polygon,
         pages=pages.astype(np.int32),
         padding=padding,
         method=method,
@@ -93,73 +92,127 @@ def layout_from_polygons(
     )
 
 
-class _BentError(Exception):
-    """A facet that no affine map takes to its place; the message says why."""
-
-
 @dataclass(frozen=True)
 class _Fit:
-    """One facet's raster and place."""
+    """Affine maps from the display's raster to the quilt, n facets.
 
-    size: tuple[int, int]
-    quilt_from_facet: FloatArray
-    origin: FloatArray
-    du: FloatArray
-    dv: FloatArray
-    polygon: FloatArray
+    Attributes:
+        linear: (n, 2, 2) and
+        offset: (n, 2): quilt = linear @ pixels + offset.
+        miss: (C,) pixels by which each corner misses its place.
+        farthest: (n,) greatest coordinate of a place.
+        start: (n+1,) offsets of the facets' corners.
+        fault: (n,) what is wrong: 0 nothing, or a row of `_FAULTS`, the first that is.
+    """
+
+    linear: FloatArray
+    offset: FloatArray
+    miss: FloatArray
+    farthest: FloatArray
+    start: IntArray
+    fault: IntArray
 
 
-def _fit(facets: Facets, row: int, pixels: FloatArray, quilt: FloatArray) -> _Fit:
-    """Raster of one facet whose corners lie at `pixels` (n, 2) of the display's raster and `quilt` (n, 2)."""
-    if not np.isfinite(quilt).all():
-        raise _BentError("a corner has no texture coordinate, or one that is not finite")
-    linear, offset = _affine(pixels, quilt)
-    turn = _nearest_turn(linear)
-    low = np.floor(quilt.min(axis=0) + PIXEL_TOLERANCE)
-    high = np.ceil(quilt.max(axis=0) - PIXEL_TOLERANCE)
-    box = turn.T @ np.stack((low, high), axis=1)
-    corner = turn @ box.min(axis=1)  # the quilt corner where the turned raster starts
-    size = np.ptp(box, axis=1)
-    display_from_quilt = np.linalg.inv(linear)
-    start = display_from_quilt @ (corner - offset)
-    steps = display_from_quilt @ turn
-    axes = np.stack((facets.du[row], facets.dv[row]))
-    return _Fit(
-        size=(int(size[0]), int(size[1])),
-        quilt_from_facet=np.concatenate((turn, corner[:, None]), axis=1),
-        origin=facets.origin[row] + start @ axes,
-        du=steps[:, 0] @ axes,
-        dv=steps[:, 1] @ axes,
-        polygon=(quilt - corner) @ turn,
+_FAULTS = (
+    "",
+    "a corner has no texture coordinate, or one that is not finite",
+    "its place in the quilt is {farthest:.3g} pixels off (are the texture coordinates right?)",
+    "its place in the quilt has no area",
+    "corner {corner} is {miss:.3g} pixels from where an affine map would have it; texture coordinates must"
+    f" not bend a facet (at most {PIXEL_TOLERANCE} pixel)",
+)
+
+
+def _affine(pixels: FloatArray, quilt: FloatArray, start: IntArray) -> _Fit:
+    """Least-squares maps from pixels (C, 2) to the quilt (C, 2), a facet each.
+
+    The regression on two variables that are made perpendicular first (Gram–Schmidt), summed corner by
+    corner: the same on every machine.
+    """
+    row, _ = segments(start)
+    count = np.diff(start)
+
+    def total(values: FloatArray) -> FloatArray:
+        return _of_rows(np.add, values, start)
+
+    def greatest(values: FloatArray) -> FloatArray:
+        return _of_rows(np.maximum, values, start)
+
+    centre, goal = (total(points) / count[:, None] for points in (pixels, quilt))
+    x, y = (pixels - centre[row]).T
+    aim = quilt - goal[row]
+    xx = total(x * x)
+    slope = total(x * y) / xx
+    across = y - slope[row] * x
+    second = total(across[:, None] * aim) / total(across * across)[:, None]
+    first = total(x[:, None] * aim) / xx[:, None] - slope[:, None] * second
+    linear = np.stack((first, second), axis=2)
+    off = aim - x[:, None] * first[row] - y[:, None] * second[row]
+    miss = np.sqrt((off * off).sum(axis=1))
+    area = np.abs(linear[:, 0, 0] * linear[:, 1, 1] - linear[:, 0, 1] * linear[:, 1, 0])
+    farthest = greatest(np.abs(quilt)).max(axis=1)
+    wrong = (
+        ~np.isfinite(total(quilt)).all(axis=1),
+        ~(farthest <= _FARTHEST),
+        ~(area > 1e-9 * (linear * linear).sum(axis=(1, 2))),
+        ~(greatest(miss) <= PIXEL_TOLERANCE),
     )
+    fault = np.select(wrong, range(1, 1 + len(wrong)), 0)
+    offset = goal - _product(linear, centre[:, :, None])[:, :, 0]
+    return _Fit(linear, offset, miss, farthest, start, fault)
 
 
-def _affine(pixels: FloatArray, quilt: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Least-squares map quilt = linear @ pixels + offset; refuses more than 0.01 pixel of residual."""
-    farthest = float(np.abs(quilt).max())
-    if farthest > _FARTHEST:
-        raise _BentError(
-            f"its place in the quilt is {farthest:.3g} pixels off (are the texture coordinates right?)"
-        )
-    centre, goal = pixels.mean(axis=0), quilt.mean(axis=0)
-    solution, _, rank, _ = np.linalg.lstsq(pixels - centre, quilt - goal, rcond=None)
-    linear: FloatArray = solution.T
-    area = abs(linear[0, 0] * linear[1, 1] - linear[0, 1] * linear[1, 0])
-    if rank < 2 or area <= 1e-9 * (linear * linear).sum():
-        raise _BentError("its place in the quilt has no area")
-    miss = np.sqrt((((pixels - centre) @ solution + goal - quilt) ** 2).sum(axis=1))
-    if miss.max() > PIXEL_TOLERANCE:
-        raise _BentError(
-            f"corner {int(miss.argmax()) + 1} is {miss.max():.3g} pixels from where an affine map would"
-            f" have it; texture coordinates must not bend a facet (at most {PIXEL_TOLERANCE} pixel)"
-        )
-    return linear, goal - linear @ centre
+def _bent(facets: Facets, row: int, fit: _Fit, at: int) -> Problem:
+    """Why no affine map takes a facet of the display to its place, which is the fit's `at`."""
+    miss = fit.miss[fit.start[at] : fit.start[at + 1]]
+    worst = int(miss.argmax())
+    words = _FAULTS[fit.fault[at]].format(farthest=fit.farthest[at], corner=worst + 1, miss=miss[worst])
+    name = f" ({facets.names[row]})" if facets.names[row] else ""
+    return Problem(f"facet {row + 1}{name}: {words}", file=facets.path)
 
 
-def _nearest_turn(linear: FloatArray) -> FloatArray:
-    """Quarter turn (2, 2), mirrored if `linear` mirrors, that is closest to it; the first of equals."""
-    units = linear / np.linalg.norm(linear, axis=0)
-    mirror = MIRROR if np.linalg.det(linear) < 0 else np.eye(2)
-    turns = QUARTER_TURNS @ mirror
-    likeness = np.round(np.einsum("kij,ij->k", turns, units), 9)
-    return np.asarray(turns[int(likeness.argmax())])
+def _rasters(
+    quilt: FloatArray, start: IntArray, linear: FloatArray
+) -> tuple[Int32Array, FloatArray, FloatArray, FloatArray]:
+    """The boxes of whole quilt pixels around polygons (C, 2), turned as the display has the facets.
+
+    Returns:
+        size (n, 2), turn (n, 2, 2), the quilt corner (n, 2) where the turned raster starts, and the
+        polygons (C, 2) on their rasters.
+    """
+    turn = _nearest_turns(linear)
+    low = np.floor(_of_rows(np.minimum, quilt, start) + PIXEL_TOLERANCE)
+    high = np.ceil(_of_rows(np.maximum, quilt, start) - PIXEL_TOLERANCE)
+    box = _product(turn.transpose(0, 2, 1), np.stack((low, high), axis=2))
+    corner = _product(turn, box.min(axis=2)[:, :, None])[:, :, 0]
+    row, _ = segments(start)
+    polygon = _product((quilt - corner[row])[:, None, :], turn[row])[:, 0]
+    return np.ptp(box, axis=2).astype(np.int32), turn, corner, polygon
+
+
+def _nearest_turns(linear: FloatArray) -> FloatArray:
+    """Quarter turns (n, 2, 2), mirrored where a map (n, 2, 2) mirrors, closest to it; the first of equals."""
+    units = linear / np.sqrt((linear * linear).sum(axis=1))[:, None, :]
+    mirrors = linear[:, 0, 0] * linear[:, 1, 1] < linear[:, 0, 1] * linear[:, 1, 0]
+    turns = np.where(mirrors[:, None, None, None], QUARTER_TURNS @ MIRROR, QUARTER_TURNS)
+    likeness = np.round((turns * units[:, None]).sum(axis=(2, 3)), 9)
+    return np.asarray(turns[np.arange(len(turns)), likeness.argmax(axis=1)])
+
+
+def _of_rows(what: np.ufunc, values: FloatArray, start: IntArray) -> FloatArray:
+    """What a sum or an extreme makes of the elements of each row of a ragged array; there may be no rows."""
+    return np.asarray(what.reduceat(values, start[:-1]) if start.size > 1 else values[:0])
+
+
+def _inverse(a: FloatArray) -> FloatArray:
+    """Inverses of matrices (n, 2, 2)."""
+    det = a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
+    swapped = np.stack((a[:, 1, 1], -a[:, 0, 1], -a[:, 1, 0], a[:, 0, 0]), axis=1)
+    result: FloatArray = (swapped / det[:, None]).reshape(-1, 2, 2)
+    return result
+
+
+def _product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Products of matrices (n, i, 2) and (n, 2, j), with sums in a fixed order."""
+    result: FloatArray = a[:, :, :1] * b[:, :1] + a[:, :, 1:] * b[:, 1:]
+    return result

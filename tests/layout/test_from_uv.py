@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -80,6 +81,37 @@ def test_slanted_facet_gets_the_box_around_it():
     # One pixel of the quilt is 2/√5 of the display's in size; the square stands 26.6° to the right.
     assert np.allclose(layout.du[0], [0.8 * PITCH, 0.4 * PITCH, 0], rtol=0, atol=1e-15)
     assert np.allclose(layout.dv[0], [0.4 * PITCH, -0.8 * PITCH, 0], rtol=0, atol=1e-15)
+
+
+def test_many_facets_take_no_more_steps_of_python_than_few():
+    def steps(count):
+        polygons = [shifted(rectangle(3, 3), 4 * (k % 40), 4 * (k // 40)) for k in range(count)]
+        facets = with_quilt(flat_display(polygons), np.concatenate(polygons), (400, 400))
+        taken = 0
+
+        def watch(frame, event, what):
+            nonlocal taken
+            taken += event == "call"
+
+        sys.setprofile(watch)
+        try:
+            layout_from_uv(facets, (400, 400))
+        finally:
+            sys.setprofile(None)
+        return taken
+
+    assert steps(800) < steps(80) + 100
+
+
+def test_narrow_facets_far_from_the_corner_keep_their_place():
+    quilt = np.array(shifted(rectangle(0.25, 9000), 8000.125, 3))
+    layout = layout_from_uv(
+        with_quilt(flat_display([rectangle(1, 9000)]), quilt, (16384, 16384)), (16384, 16384)
+    )
+    assert np.allclose(
+        world(layout), np.array([*rectangle(1, 9000)]) @ [[PITCH, 0, 0], [0, -PITCH, 0]], atol=1e-12
+    )
+    assert np.allclose(layout.du, [[4 * PITCH, 0, 0]], rtol=1e-12, atol=0)
 
 
 def world(layout):

@@ -11,7 +11,7 @@ from quiltcli.display import lit_facets
 from quiltcli.geometry import dot
 from quiltcli.layout import align
 from quiltcli.visibility.binning import pairs as binning
-from quiltcli.visibility.binning.broad import ConeGrids, candidate_pairs, cube_faces
+from quiltcli.visibility.binning.broad import ConeGrids, candidate_pairs, cube_faces, footprints
 from quiltcli.visibility.binning.cones import by_corner, cone_planes, overlapping
 from quiltcli.visibility.binning.cores import facet_cores
 from quiltcli.visibility.binning.pairs import Cores, facet_parts, lit_cones
@@ -47,6 +47,16 @@ def room():
     return display(CUBE, CUBE_FACES, 40, viewing_side="back")
 
 
+def prism(strips, half=2.4):
+    """Tall strips all around the origin, seen from inside, as a cylinder panorama cut into planes."""
+    angle = 2 * np.pi * np.arange(strips) / strips
+    ring = np.stack((np.sin(angle), np.zeros(strips), -np.cos(angle)), axis=1)
+    low, ahead = np.arange(strips), np.roll(np.arange(strips), -1)
+    faces = np.stack((low, ahead, ahead + strips, low + strips), axis=1)
+    vertices = np.concatenate((ring + (0, -half, 0), ring + (0, half, 0)))
+    return display(vertices, faces.tolist(), 100, viewing_side="both")
+
+
 CASES = {
     "sphere": (sphere_display, (2.2, 1.8, 3.2)),
     "sphere, near": (sphere_display, (1.02, 0.1, 0.2)),
@@ -54,6 +64,8 @@ CASES = {
     "concave, one degree off its plane": (l_shape, (2.5, 0, 2.5 * np.tan(np.radians(1)))),
     "self-intersecting": (crossed_panels, (0.2, 0.3, 3)),
     "surround": (room, (0.3, 0.1, -0.2)),
+    "strips around the eye": (lambda: prism(24), (0, 0, 0)),
+    "strips around, one next to the eye": (lambda: prism(24), (0.131, 0.0, -0.98)),
 }
 
 
@@ -229,6 +241,44 @@ def test_the_broad_phase_keeps_all_that_overlaps(seed):
         zip(*(i.tolist() for i in candidate_pairs(by_corner(polygons), ConeGrids(targets))), strict=True)
     )
     assert set(zip(first[meets].tolist(), second[meets].tolist(), strict=True)) - found == set()
+
+
+@pytest.mark.parametrize("eye", [(0, 0, 0), (0.2, -0.3, 0.1)])
+def test_strips_around_the_eye_meet_their_neighbours_alone(eye):
+    """Tall strips reach behind the planes of the faces above and below, and are no candidates there."""
+    facets = prism(96)
+    layout = align(pack(facets, "rows"), facets)
+    cones = lit_cones(facet_parts(facets, layout, 1), np.ones(96, bool), np.array(eye, float))
+    first, second = candidate_pairs(by_corner(cones.corners), cones.grids)
+    apart = np.abs(first - second)
+    assert set(np.unique(np.minimum(apart, 96 - apart))) >= {0, 1}
+    # Strips narrow towards the middle of the faces above and below, where rectangles are a poor measure.
+    assert first.size < 96 * 30
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_polygon_shows_on_a_face_only_within_its_rectangle(seed):
+    rng = np.random.default_rng(seed)
+    polygons = rng.normal(size=(300, 1, 3)) * 10 ** rng.uniform(-6, 1, (300, 1, 1)) + rng.normal(
+        size=(300, 3, 3)
+    )
+    weights = rng.dirichlet((0.4, 0.4, 0.4), 500)
+    shown = 0
+    for frame in cube_faces(rng.normal(size=3)):
+        prints = footprints(by_corner(polygons), frame)
+        low, high = np.full((2, 300), np.inf), np.full((2, 300), -np.inf)
+        low[:, prints.index], high[:, prints.index] = prints.low, prints.high
+        points = np.einsum("sk,tkc->tsc", weights, polygons) @ frame.T
+        x, y, w = np.moveaxis(points, 2, 0)
+        seen = (w > 0) & (np.abs(x) <= w) & (np.abs(y) <= w)
+        for axis, value in ((0, x), (1, y)):
+            place = np.divide(value, w, out=np.zeros_like(w), where=seen)
+            within = (place >= low[axis][:, None] - 1e-9) & (place <= high[axis][:, None] + 1e-9)
+            assert within[seen].all()
+        shown += int(seen.sum())
+        covering = (prints.high - prints.low == 2).all(axis=0)
+        assert covering.sum() < 0.4 * covering.size
+    assert shown > 10_000
 
 
 def test_cube_faces_are_six_right_handed_frames():

@@ -1,9 +1,9 @@
 """The broad phase: which polygons may overlap which, seen from the eye.
 
 Directions are looked at through the six faces of a cube around the eye. On a face, polygons become
-rectangles; a grid of cells finds those that meet. A polygon beside or behind a face's plane is
-thrown out by the face's side planes or, rarely, counted as covering the whole face: too many
-candidates only cost time, the exact test follows.
+rectangles; a grid of cells finds those that meet. A polygon that reaches behind the eye, seen through
+this face, is cut to what the face can show first; one that passes the eye by next to nothing counts as
+covering the whole face. Too many candidates only cost time, the exact test follows.
 """
 
 from __future__ import annotations
@@ -14,9 +14,16 @@ from functools import reduce
 import numpy as np
 
 from quiltcli.geometry import FloatArray, IntArray, dot, normalized, offsets, segments, shares
+from quiltcli.visibility.binning.cut import cut_polygons
 
 _CHUNK = 1 << 20
 _NEAR_PLANE = 1e-6
+_SLACK = 1e-6
+"""What polygons are widened by, on a face of [-1, 1], where they were cut."""
+_AT_THE_EYE = 1e-9
+"""Of a polygon's size: nearer to the eye than this, nothing is said about where it is seen."""
+_ALL_AROUND = 1e-6
+"""Cones whose mean direction is no longer than this are all around: their mean is rounding alone."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +77,8 @@ class ConeGrids:
             return
         columns = np.ascontiguousarray(cones.transpose(1, 2, 0))
         middle = normalized(cones).reshape(-1, 3).mean(axis=0)
-        if not middle.any():  # facets all around the eye: any direction will do
-            middle[2] = -1.0
+        if np.sqrt(dot(middle, middle)) < _ALL_AROUND:  # any direction will do: the world's axes, then
+            middle = np.array([0.0, 0.0, -1.0])
         for frame in cube_faces(middle):
             targets = footprints(columns, frame)
             if targets.index.size:
@@ -124,17 +131,42 @@ def footprints(polygons: FloatArray, frame: FloatArray) -> Footprints:
         x, y, w = (values.take(index, axis=1) for values in (x, y, w))
     front = (w > _NEAR_PLANE * (np.abs(x) + np.abs(y) + np.abs(w))).all(axis=0)
     all_front = bool(front.all())
+    around = None if all_front else np.flatnonzero(~front)
+    cut = None if around is None else _cut_to_face(np.stack((x, y, w), axis=2).take(around, axis=1))
     scale = np.reciprocal(w if all_front else np.where(front, w, 1.0))
     x *= scale
     y *= scale
     low, high = (np.stack([reduce(extreme, axis) for axis in (x, y)]) for extreme in (np.minimum, np.maximum))
-    if not all_front:
-        low[:, ~front], high[:, ~front] = -1.0, 1.0
+    if around is not None and cut is not None:
+        low[:, around], high[:, around] = cut
     seen = np.flatnonzero((low[0] <= 1) & (low[1] <= 1) & (high[0] >= -1) & (high[1] >= -1))
     prints = Footprints(index, low, high).take(seen)
     np.maximum(prints.low, -1.0, out=prints.low)
     np.minimum(prints.high, 1.0, out=prints.high)
     return prints
+
+
+def _cut_to_face(polygons: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Where polygons (n, N, 3), right, up and forward on a face, show on it after all else is cut away.
+
+    Returns:
+        least and greatest x and y (2, N), far outside the face where a polygon does not show.
+    """
+    corners = polygons.transpose(1, 0, 2)
+    reach = np.abs(corners).max(axis=(1, 2))
+    counts = np.full(len(corners), corners.shape[1])
+    for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
+        side = (1 + _SLACK) * corners[..., 2] - sign * corners[..., axis]
+        corners, counts = cut_polygons(corners, counts, side)
+    shown = counts > 0
+    depth = corners[..., 2]
+    # What is left lies ahead; closer to the eye than rounding allows, the directions are not known.
+    unsure = shown & (depth <= _AT_THE_EYE * reach[:, None]).any(axis=1)
+    plane = corners[..., :2] / np.where((shown & ~unsure)[:, None], depth, 1.0)[..., None]
+    low, high = plane.min(axis=1).T - _SLACK, plane.max(axis=1).T + _SLACK
+    low[:, unsure], high[:, unsure] = -1.0, 1.0
+    low[:, ~shown], high[:, ~shown] = np.inf, -np.inf
+    return low, high
 
 
 def _areas(cells: IntArray) -> IntArray:

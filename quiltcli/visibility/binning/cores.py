@@ -14,6 +14,7 @@ import numpy as np
 from quiltcli.geometry import FloatArray, IntArray, dot, segments
 from quiltcli.visibility.binning.broad import candidate_pairs
 from quiltcli.visibility.binning.cones import Cones, by_corner, overlapping
+from quiltcli.visibility.binning.cut import cut_polygons
 
 _MARGIN = 1e-5
 """Radians kept free beside another facet's cone; Embree's rays are single precision."""
@@ -42,7 +43,7 @@ def facet_cores(cones: Cones) -> tuple[FloatArray, IntArray]:
         if not cut.any():
             continue
         mine = mine[cut]
-        clipped, left = _clip(corners[mine], counts[mine], side[cut])
+        clipped, left = cut_polygons(corners[mine], counts[mine], side[cut])
         # A cut may add a corner.
         wider = clipped.shape[1] - corners.shape[1]
         if wider > 0:
@@ -92,29 +93,3 @@ def _sides(polygons: FloatArray, planes: FloatArray) -> FloatArray:
     length = np.sqrt(dot(polygons, polygons))
     result: FloatArray = dot(polygons, planes[:, None, :]) - _MARGIN * length
     return result
-
-
-def _clip(polygons: FloatArray, counts: IntArray, side: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Clip convex polygons (N, n, 3) with `counts` corners where `side` (N, n) is 0 or less.
-
-    The way of Sutherland & Hodgman.
-
-    Returns:
-        polygons (N, m, 3), short ones repeating their last corner, and their corner counts (N,);
-        fewer than three corners are none.
-    """
-    ahead_of = np.roll(np.arange(polygons.shape[1]), -1)
-    valid = np.arange(polygons.shape[1]) < counts[:, None]
-    ahead = np.where(np.arange(polygons.shape[1]) == counts[:, None] - 1, 0, ahead_of)
-    next_side = np.take_along_axis(side, ahead, axis=1)
-    crosses = valid & ((side > 0) != (next_side > 0))
-    share = np.divide(side, side - next_side, out=np.zeros_like(side), where=crosses)[..., None]
-    cut = polygons + share * (np.take_along_axis(polygons, ahead[..., None], axis=1) - polygons)
-    points = np.stack((polygons, cut), axis=2).reshape(len(polygons), -1, 3)
-    kept = np.stack((valid & (side > 0), crosses), axis=2).reshape(len(polygons), -1)
-    left = kept.sum(axis=1)
-    order = np.argsort(~kept, axis=1, kind="stable")
-    width = max(int(left.max(initial=1)), 1)
-    rank = np.minimum(np.arange(width), np.maximum(left - 1, 0)[:, None])
-    result = np.take_along_axis(points, np.take_along_axis(order, rank, axis=1)[..., None], axis=1)
-    return result, np.where(left >= 3, left, 0)

@@ -1,0 +1,39 @@
+"""Every problem of a YAML file of any kind, and of those it names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from quiltcli.errors import JobError, Problem
+from quiltcli.job.job import JobFile
+from quiltcli.job.layout import LayoutFile
+from quiltcli.job.layout_table import read_layout_table
+from quiltcli.job.load import (
+    file_kind,
+    load_display_file,
+    load_job,
+    load_scene_file,
+    tried,
+)
+
+
+def check_file(path: Path | str) -> list[Problem]:
+    """Every problem of a YAML file, and of the YAML files a job names; none when all is well."""
+    try:
+        kind = file_kind(path)
+    except JobError as error:
+        return list(error.problems)
+    if kind != JobFile.kind:
+        return tried(_LOAD[kind], Path(path))[0]
+    problems, job = tried(load_job, Path(path))
+    if job is not None and isinstance(job.layout, Path):
+        problems += tried(read_layout_table, job.layout)[0]
+    return problems
+
+
+_LOAD: dict[str, Callable[[Path], object]] = {
+    "quilt_display": load_display_file,
+    LayoutFile.kind: read_layout_table,
+    "quilt_scene": load_scene_file,
+}
