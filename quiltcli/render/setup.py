@@ -20,6 +20,7 @@ from quiltcli.render.needs import demand_memory
 from quiltcli.scene import Scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
+from quiltcli.scene.textures.pool import TextureLimits, TextureStore
 from quiltcli.shading.lights import demand_shadows
 from quiltcli.viewer.clip import settled_clip
 from quiltcli.viewer.view import View, facet_problems, views_of
@@ -91,7 +92,8 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     raise_all(JobError, facet_problems(job, facets.count))
     layout = layout_for(job.layout or PackSpec(), facets, kept)
     demand_memory(job, layout)
-    scene, source = load_moving_scene(scene_spec(job), float(job.fps))
+    store = TextureStore(texture_limits(job))
+    scene, source = load_moving_scene(scene_spec(job), float(job.fps), store)
     demand_shadows(scene)
     return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)
 
@@ -100,6 +102,12 @@ def scene_spec(job: JobFile) -> SceneFile:
     """The scene file of a job, as the job wants it drawn."""
     spec = load_scene_file(job.scene)
     return spec if job.render.shadows else spec.without_shadows()
+
+
+def texture_limits(job: JobFile) -> TextureLimits:
+    """What the textures of a job may take, and how well they are filtered."""
+    how = job.render
+    return TextureLimits(how.texture_memory, how.max_texture, how.anisotropy)
 
 
 def stage_of(job: JobFile, facets: Facets, layout: Layout, scene: Scene, bleed: int) -> Stage:

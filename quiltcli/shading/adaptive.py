@@ -20,12 +20,15 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.scene import Scene
 from quiltcli.shading.brdf import alpha
 from quiltcli.shading.lights import Middle, asks_for_places, casting, reaches, turns
-from quiltcli.shading.materials import albedo_at, vertex_colors
+from quiltcli.shading.materials import albedo_at, emission_at, occlusion_at, vertex_colors
 from quiltcli.shading.nodes import NodeColors, nodes_of, points_at_nodes
 from quiltcli.shading.shade import Lamps, Light, Shades, all_lamps, filled, shade, shade_apart
 from quiltcli.shading.shadows import CENTRE, Sample, Shadows, casts
 from quiltcli.shading.surface import Surface
+from quiltcli.shading.textures import covers
+from quiltcli.shading.textures.bumps import bent
 from quiltcli.visibility.draw import Hits, MixedTiles, Region, WholeTiles
+from quiltcli.visibility.resolve.hits import Points
 from quiltcli.visibility.resolve.vectors import sum_of_products
 
 _FAR = 24.0
@@ -34,6 +37,9 @@ _FAR = 24.0
 _MOST = np.float32(2.0**100)
 _VARIED = 8
 """Vertex colours are smooth where the brightest in a square is at most so many times the darkest."""
+
+_TEXTURED = 512
+"""Microtiles whose pixels fit the cache with all that is needed to look textures up."""
 
 _FLOOR = 1 / 64
 """Where cosines are smaller, single precision is too coarse for a polynomial."""
@@ -66,7 +72,12 @@ class NodeLight:
     def apart(self) -> Light[NodeColors]:
         """Its parts."""
         light = shade_apart(self.scene, self.eye, points_at_nodes(self.squares), self._lamps)
-        return Light(self._of(light.diffuse), self._of(light.specular), self._of(light.emission))
+        return Light(
+            self._of(light.diffuse),
+            self._of(light.specular),
+            self._of(light.emission),
+            None if light.around is None else self._of(light.around),
+        )
 
     @property
     def _lamps(self) -> Lamps:
@@ -103,6 +114,8 @@ class Shaded:
         hits: its visible points.
         nodes: the light of squares, of which these hits are a part; None where light is not smooth.
         part: which of the squares.
+        cover: how textures cover all of them, where that is known: `covers.PLAIN`, `UNLIT` or `BASE`;
+            `FULL` where it differs or light is worked out at every point.
         sample: which sample of its pixels they are.
     """
 
@@ -111,16 +124,26 @@ class Shaded:
     hits: Hits
     nodes: NodeLight | None = None
     part: slice = field(default_factory=lambda: slice(None))
+    cover: int = covers.FULL
     sample: Sample = CENTRE
+
+    @cached_property
+    def points(self) -> Points:
+        """The hits' points, their normals as normal maps bend them."""
+        return bent(self.scene, self.hits.points)
 
     @property
     def total(self) -> NodeColors | Shades:
         """All light, at nodes or at points."""
+        if self.cover == covers.UNLIT:
+            return self.emission
         if self.nodes is None:
-            return shade(self.scene, self.eye, self.hits.points, all_lamps(self.scene, self.sample))
+            return shade(self.scene, self.eye, self.points, all_lamps(self.scene, self.sample))
+        if self.cover == covers.BASE:
+            return self._composed
         base = self.nodes.total[self.part]
         cast = [lamp.total[self.part] for lamp in self.nodes.cast]
-        return self._with_shadows(base, cast) if cast else base
+        return self._with_shadows(tuple(base.pixels()), cast) if cast else base
 
     def pixels(self) -> Shades:
         """All light, at points."""
@@ -131,22 +154,30 @@ class Shaded:
     def apart(self) -> Light[NodeColors] | Light[Shades]:
         """The light's parts, at nodes or at points."""
         if self.nodes is None:
-            return shade_apart(self.scene, self.eye, self.hits.points, all_lamps(self.scene, self.sample))
+            return shade_apart(self.scene, self.eye, self.points, all_lamps(self.scene, self.sample))
+        if self.cover == covers.BASE:
+            return self._covered
         light, part = self.nodes.apart, self.part
-        base = Light(light.diffuse[part], light.specular[part], light.emission[part])
         if not self.nodes.cast:
-            return base
-        cast = [lamp.apart for lamp in self.nodes.cast]
-        return Light(
-            self._with_shadows(base.diffuse, [light.diffuse[part] for light in cast]),
-            self._with_shadows(base.specular, [light.specular[part] for light in cast]),
-            tuple(base.emission.pixels()),
+            return Light(light.diffuse[part], light.specular[part], light.emission[part])
+        diffuse, specular = tuple(light.diffuse[part].pixels()), tuple(light.specular[part].pixels())
+        return Light(*self._cast(diffuse, specular), tuple(light.emission[part].pixels()))
+
+    def _cast(self, diffuse: Shades, specular: Shades) -> tuple[Shades, Shades]:
+        """Diffuse and specular light at points, and what is shown of each lamp that casts shadows."""
+        assert self.nodes is not None
+        cast, part = [lamp.apart for lamp in self.nodes.cast], self.part
+        if not cast:
+            return diffuse, specular
+        return (
+            self._with_shadows(diffuse, [light.diffuse[part] for light in cast]),
+            self._with_shadows(specular, [light.specular[part] for light in cast]),
         )
 
-    def _with_shadows(self, base: NodeColors, cast: Sequence[NodeColors]) -> Shades:
+    def _with_shadows(self, base: Shades, cast: Sequence[NodeColors]) -> Shades:
         """Light of which nothing is hidden, and what is shown of each lamp, at points."""
-        count = max(len(light.values) for light in (base, *cast))
-        total = [*base.pixels()] * (count // len(base.values))
+        count = max(len(base), *(len(light.values) for light in cast))
+        total = [*base] * (count // len(base))
         for light, shown in zip(cast, self._shown, strict=True):
             colors = light.pixels()
             for k in range(count):
@@ -172,6 +203,44 @@ class Shaded:
         """The base colour, at points: it may vary as it likes."""
         return filled(albedo_at(self.scene, self.hits.points), self.hits.points)
 
+    @property
+    def emission(self) -> Shades:
+        """What needs no lamp, at points."""
+        return filled(emission_at(self.scene, self.hits.points), self.hits.points)
+
+    @cached_property
+    def _covered(self) -> Light[Shades]:
+        """The parts of light at nodes, and what textures do to them, at points."""
+        assert self.nodes is not None
+        light, part = self.nodes.apart, self.part
+        diffuse = self._open(tuple(light.diffuse[part].pixels()), light.around)
+        return Light(*self._cast(diffuse, tuple(light.specular[part].pixels())), self.emission)
+
+    @property
+    def _composed(self) -> Shades:
+        """All light at points, of that at nodes and of textures that vary from point to point."""
+        light = self._covered
+        albedo, emission = self.albedo, light.emission
+        diffuse, specular = (each * (3 // len(each)) for each in (light.diffuse, light.specular))
+        result = []
+        for k in range(3):
+            total = albedo[k] * diffuse[k]
+            total += specular[k]
+            total += emission[k]
+            result.append(total)
+        return tuple(result)
+
+    def _open(self, diffuse: Shades, around: NodeColors | None) -> Shades:
+        """Diffuse light less what textures say that does not arrive from everywhere."""
+        share = None if around is None else occlusion_at(self.scene, self.hits.points)
+        if around is None or share is None:
+            return diffuse
+        lost = share - np.float32(1)
+        return tuple(
+            np.maximum(d + a * lost, np.float32(0))
+            for d, a in zip(diffuse, around[self.part].pixels(), strict=True)
+        )
+
 
 def shaded(
     regions: Iterable[Region], scene: Scene, eye: FloatArray, sample: Sample = CENTRE
@@ -180,21 +249,38 @@ def shaded(
 
     A square in which it is not is looked at by microtiles, a microtile pixel by pixel.
     """
+    of_material = covers.covers_of(scene)
     for region in regions:
         if isinstance(region, MixedTiles):
             yield from (Shaded(scene, eye, hits, sample=sample) for hits in region.hits())
-            continue
-        # Light at nine nodes a square where these tell enough of it.
-        smooth = is_smooth(region, scene, eye)
-        some = region.of(smooth)
-        nodes = NodeLight(scene, eye, some)
-        for part in some.parts():
-            yield Shaded(scene, eye, some[part].read(), nodes, part, sample)
-        # What is left: smaller squares, or if there are none, pixels.
-        if region.side > 1:
-            yield from shaded(region.split(~smooth), scene, eye, sample)
+        elif of_material is None:
+            yield from _shaded_whole(region, scene, eye, covers.PLAIN, sample)
         else:
-            yield from (Shaded(scene, eye, hits, sample=sample) for hits in region.of(~smooth).hits())
+            cover = of_material.take(scene.material.take(region.triangle))
+            for each in np.unique(cover).tolist():
+                yield from _shaded_whole(region.of(cover == each), scene, eye, each, sample)
+
+
+def _shaded_whole(
+    squares: WholeTiles, scene: Scene, eye: FloatArray, cover: int, sample: Sample
+) -> Iterator[Shaded]:
+    """As `shaded`, of squares that textures cover alike."""
+    if cover in (covers.UNLIT, covers.FULL):
+        for part in squares.parts(_TEXTURED):
+            yield Shaded(scene, eye, squares[part].read(), cover=cover, sample=sample)
+        return
+    # Light at nine nodes a square where these tell enough of it.
+    smooth = is_smooth(squares, scene, eye)
+    some = squares.of(smooth)
+    nodes = NodeLight(scene, eye, some)
+    for part in some.parts(*((_TEXTURED,) if cover == covers.BASE else ())):
+        yield Shaded(scene, eye, some[part].read(), nodes, part, cover, sample)
+    # What is left: smaller squares, or if there are none, pixels.
+    if squares.side > 1:
+        for smaller in squares.split(~smooth):
+            yield from _shaded_whole(smaller, scene, eye, cover, sample)
+    else:
+        yield from (Shaded(scene, eye, hits, sample=sample) for hits in squares.of(~smooth).hits())
 
 
 def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:
