@@ -64,7 +64,7 @@ def tint_at(scene: Scene, seen: Points) -> Colors | None:
     texels = texels_at(scene, seen, "color", COLOR)
     if scene.corner_colors is None:
         return None if texels is None else tuple(texels)
-    own = vertex_colors(scene.corner_colors, seen)
+    own = between_corners(scene.corner_colors, seen)
     return tuple(own if texels is None else own * texels)
 
 
@@ -148,8 +148,8 @@ def lit_at(scene: Scene, seen: Points) -> Values:
     return at_materials(scene, lit[:, None], seen.triangle)[0]
 
 
-def vertex_colors(table: Float32Array, seen: Points) -> Float32Array:
-    """Colours (3, n, k) between the corners of triangles, by the scene's `corner_colors`."""
+def between_corners(table: Float32Array, seen: Points) -> Float32Array:
+    """Values (3, n, k) between the corners of triangles, by a table (T, 9) such as `Scene.corner_colors`."""
     assert seen.weights is not None
     rows = columns(table, seen.triangle)
     value: Float32Array = rows[3:6] * seen.weights[0]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from quiltcli.formats.gltf.accessors import Accessors
 from quiltcli.formats.gltf.container import Container
 from quiltcli.formats.gltf.json_values import Json
-from quiltcli.formats.pictures import PictureSize, UnreadablePictureError, picture_pixels, picture_size
+from quiltcli.formats.picture_bytes import PictureSize, UnreadablePictureError, picture_pixels, picture_size
 
 T = TypeVar("T")
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from quiltcli.errors import MeshError, Problem, SceneError
 from quiltcli.formats.gltf.images import Images
 from quiltcli.formats.inputs import read_input
-from quiltcli.formats.pictures import PictureSize, UnreadablePictureError, picture_pixels, picture_size
+from quiltcli.formats.picture_bytes import PictureSize, UnreadablePictureError, picture_pixels, picture_size
 
 T = TypeVar("T")
 

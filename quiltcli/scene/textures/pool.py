@@ -22,10 +22,11 @@ from quiltcli.errors import Problem, SceneError
 from quiltcli.formats.capacity import bytes_text
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.scene.materials import Texture
+from quiltcli.scene.scene import Scene
 from quiltcli.scene.textures.levels import Texels, level_sizes, levels_of
 from quiltcli.scene.textures.picture import Picture
 
-ROLES = ("color", "emission", "metallic", "roughness", "occlusion")
+ROLES = ("color", "emission", "metallic", "roughness", "normal", "occlusion")
 """What textures vary that are drawn."""
 IN_SRGB = ("color", "emission")
 """Roles of textures whose numbers are encoded for displays."""
@@ -120,6 +121,18 @@ class Textures:
     slots: Mapping[str, Slot]
     lays: tuple[Lay, ...]
     anisotropy: int
+
+
+def mean_texels(scene: Scene, role: str) -> Float32Array:
+    """The mean colour (M, 3) of each material's texture of a role, 1 where it has none."""
+    textures = scene.textures
+    result = np.ones((len(scene.materials.color), 3), dtype=np.float32)
+    if textures is not None and role in textures.slots:
+        image = textures.slots[role].image
+        rows = np.flatnonzero(image >= 0)
+        last = textures.first[textures.start[image[rows] + 1] - 1]
+        result[rows] = textures.texels[last].view(np.float16).reshape(-1, 4)[:, :3]
+    return result
 
 
 @dataclass

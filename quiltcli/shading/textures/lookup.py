@@ -6,13 +6,11 @@ a triangle; places and footprints are worked out once for all textures that lie 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array
 from quiltcli.scene import Scene
+from quiltcli.scene.textures.coordinates import texture_corners
 from quiltcli.scene.textures.pool import Lay, Slot, Textures
 from quiltcli.shading.textures.filter import look_up
 from quiltcli.visibility.resolve.footprints import Edges, Footprint
@@ -86,24 +84,9 @@ def footprint_of(scene: Scene, edges: Edges, lay: int) -> Footprint:
     return found
 
 
-def texture_corners(scene: Scene, triangle: Int32Array, uv_set: NDArray[Any] | int) -> FloatArray:
-    """Texture coordinates (2, 3, S) of the corners of triangles (S,), v up; 0 where there are none."""
-    corner = scene.triangles.take(triangle, axis=0)
-    result = np.zeros((*corner.shape, 2))
-    for number, uv in enumerate((scene.uv, scene.uv1)):
-        rows = np.flatnonzero(np.broadcast_to(uv_set == number, triangle.shape))
-        if uv is not None and rows.size:
-            result[rows] = np.nan_to_num(uv.take(corner[rows], axis=0), nan=0.0)
-    return np.ascontiguousarray(result.transpose(2, 1, 0))
-
-
 def _footprint(scene: Scene, edges: Edges, lay: Lay) -> Footprint:
-    material = scene.material.take(edges.triangle)
-    period = lay.period.take(material, axis=0).T
-    u, v = texture_corners(scene, edges.triangle, lay.uv_set.take(material))
-    v = 1.0 - v
-    rows = lay.matrix.take(material, axis=0)
-    corners = np.stack([rows[:, k, 0] * u + rows[:, k, 1] * v + rows[:, k, 2] for k in range(2)])
+    period = lay.period.take(scene.material.take(edges.triangle), axis=0).T
+    corners = texture_corners(scene, edges.triangle, lay)
     # Far from 0 there would be fewer bits for what lies between texels.
     corners -= _whole_periods(corners.min(axis=1), period)[:, None]
     found = edges.footprint(corners)
