@@ -22,6 +22,7 @@ from quiltcli.job.model import (
     Model,
     OneOf,
     ScenePath,
+    Unit,
     YamlPath,
     complaint,
     describe,
@@ -36,8 +37,10 @@ LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
 COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
 CLIPS = ("auto", "planar", "distance")
 STEREO = ("files", "parts")
+PARTS = ("layers", "parts")
 _NAME = re.compile(r"[\w-]+")
 MOST_SAMPLES = 4096
+MOST_TIMES = 256
 MOST_BLEED = 4096
 UNLIT = ("write", "link", "skip")
 DATA_WINDOWS = ("full", "tight")
@@ -103,6 +106,10 @@ class RenderSpec(Model):
 
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
+    shutter: Unit = 0.0
+    """How long the shutter is open from the frame's time on, as a share of a frame: motion blur."""
+    motion_samples: Annotated[int, Field(ge=1, le=MOST_TIMES)] = 16
+    """Times at most at which the samples of a pixel look while the shutter is open."""
     method: Annotated[str, OneOf(METHODS)] = "homography"
     """Render method."""
     depth_bits: Annotated[
@@ -121,6 +128,11 @@ class RenderSpec(Model):
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
 
+    @property
+    def averages(self) -> bool:
+        """Whether light is the mean of samples, and not that of the pixel's centre at the frame's time."""
+        return self.samples > 1 or self.shutter > 0
+
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
         return "zv" in channels or self.depth_bits is not None or self.method not in ("homography", "raycast")
@@ -134,6 +146,8 @@ class RenderSpec(Model):
             yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
+        if self.method in ("raycast", "twopass") and self.shutter:
+            yield ("shutter",), f"expected 0 beside method: {self.method}, got {self.shutter:g}"
 
 
 class OutputSpec(Model):
@@ -154,6 +168,8 @@ class OutputSpec(Model):
     """OpenEXR compression."""
     stereo: Annotated[str, OneOf(STEREO)] = "files"
     """Two eyes' images: files of their own, or parts of one file."""
+    parts: Annotated[str, OneOf(PARTS)] = "layers"
+    """Channels of an image: layers of one part, or a part of the file each."""
     unlit: Annotated[str, OneOf(UNLIT)] = "write"
     """Images of facets that face away from the viewer: written, hard links to one of their size, or none."""
     data_window: Annotated[str, OneOf(DATA_WINDOWS)] = "full"
@@ -164,6 +180,10 @@ class OutputSpec(Model):
         if not (self.quilts or self.facets):
             yield (), "nothing to write (expected quilts or facets to be true)"
         yield from _twice(self.channels)
+        mattes = [name for name in self.channels if CHANNELS[name].matte]
+        if mattes and self.compression not in LOSSLESS:
+            words = f"{self.compression} alters the identities in {mattes[0]} (expected {either(LOSSLESS)})"
+            yield ("compression",), words
 
 
 def _twice(channels: Sequence[str]) -> Iterator[Complaint]:
@@ -220,6 +240,10 @@ class JobFile(FileModel):
         if self.render.clip == "distance" and "zv" in self.output.channels:
             words = "zv lies between a near and a far plane (expected planar or auto), got distance"
             yield ("render", "clip"), words
+        for index, name in enumerate(self.output.channels):
+            if self.render.method == "twopass" and (CHANNELS[name].matte or name == "motion"):
+                words = f"{name} cannot be resampled, which method: twopass does (expected another method)"
+                yield ("output", "channels", index), words
 
     kind: ClassVar[str] = "quilt_job"
 

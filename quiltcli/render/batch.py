@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from quiltcli.geometry import BoolArray
-from quiltcli.render.antialiasing import averaged, draw_samples
+from quiltcli.projection.gaze import Gaze
+from quiltcli.render.antialiasing import draw_samples
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
+from quiltcli.render.sums import summed
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
@@ -29,7 +31,13 @@ class Drawn:
 
 
 def draw_batch(
-    stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, stale: BoolArray
+    stage: Stage,
+    frame: Frame,
+    batch: tuple[int, int],
+    buffers: Buffers,
+    stale: BoolArray,
+    *,
+    exposed: bool = False,
 ) -> Drawn:
     """Draw one batch into the buffers; its pixels belong to no other batch.
 
@@ -40,22 +48,24 @@ def draw_batch(
         buffers: written to.
         stale: (m,) microtiles of these blocks that still hold another frame and have to be emptied where
             nothing is seen.
+        exposed: whether what is made of samples is left to exposures, which are drawn by themselves.
     """
     frame = ordered(stage, frame)
     block = np.arange(*batch)
     lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers)
     channels = stage.job.output.channels
-    light = averaged(channels) if stage.job.render.samples > 1 else ()
+    light = summed(channels) if exposed or stage.job.render.samples > 1 else ()
     if light:
-        draw_samples(stage, frame, batch, buffers, light)
+        if not exposed:
+            draw_samples(stage, frame, batch, buffers, light)
         channels = tuple(name for name in channels if name not in light)
     wanted = wanted_for(channels, stage.scene)
     if frame.order is not None:
         wanted |= Wanted.POSITION
     visible, first = 0, stage.blocks.tiles(batch).start
-    drawing = draw(frame, batch)
+    drawing, gaze = draw(frame, batch), Gaze(frame.viewer, frame.rays)
     for shaded in shaded_for(channels, drawing, wanted, stage.scene, frame.viewer.eye):
-        fill(buffers, channels, frame.viewer, shaded)
+        fill(buffers, channels, gaze, shaded)
         if frame.order is not None:
             fill_stored(buffers, frame.order, shaded.hits)
         visible += shaded.hits.inside

@@ -51,7 +51,7 @@ def mends_itself(stage: Stage) -> bool:
 
     Not with a background, which lies under everything, nor with several samples a pixel, which see more.
     """
-    return not has_background(stage) and stage.job.render.samples == 1
+    return not has_background(stage) and not stage.job.render.averages
 
 
 def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:

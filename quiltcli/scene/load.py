@@ -58,6 +58,8 @@ class _Gathered:
     baked: list[Baked] = field(default_factory=list)
     materials: list[list[int]] = field(default_factory=list)
     surfaces: dict[Surface, int] = field(default_factory=dict)
+    named: list[list[int]] = field(default_factory=list)
+    material_names: dict[str, int] = field(default_factory=dict)
     textures: int = 0
     coverage: Coverage = NOTHING
     notices: list[str] = field(default_factory=list)
@@ -66,15 +68,18 @@ class _Gathered:
 
     def take(self, name: str, brought: Brought, playing: Playing | None) -> None:
         """Append what an object brings."""
-        self.add(name, brought.asset, brought.baked, brought.surfaces)
+        self.add(name, brought)
         self.animate(name, brought.asset.model, playing)
         self.light(name, brought.lights)
 
-    def add(self, name: str, asset: Asset, baked: Baked, surfaces: Sequence[Surface]) -> None:
-        """Append an object; its parts have the given surfaces."""
+    def add(self, name: str, brought: Brought) -> None:
+        """Append an object; a material that has no name has the object's."""
+        asset, baked = brought.asset, brought.baked
         self.names.append(name)
         self.baked.append(baked)
-        self.materials.append([self.surfaces.setdefault(s, len(self.surfaces)) for s in surfaces])
+        self.materials.append([self.surfaces.setdefault(s, len(self.surfaces)) for s in brought.surfaces])
+        called = [material or name for material in brought.materials]
+        self.named.append([self.material_names.setdefault(m, len(self.material_names)) for m in called])
         self.textures += asset.textures
         self.coverage += asset.coverage
         for count, why in ((baked.infinite, "with NaN or infinite vertices"), (baked.empty, "of no area")):
@@ -168,7 +173,10 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
     baked = gathered.baked
     counts = [len(b.triangles) for b in baked]
     base = np.cumsum([0, *(len(b.vertices) for b in baked)])
-    rows = [np.array(m, dtype=np.int32)[b.part] for m, b in zip(gathered.materials, baked, strict=True)]
+    rows, named = (
+        [np.array(m, dtype=np.int32)[b.part] for m, b in zip(table, baked, strict=True)]
+        for table in (gathered.materials, gathered.named)
+    )
     triangles = [b.triangles + start for b, start in zip(baked, base, strict=False)]
     return Scene(
         vertices=np.concatenate([b.vertices for b in baked]),
@@ -184,6 +192,8 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         background=np.array(background, dtype=np.float32),
         uv=given_uv(baked),
         coverage=gathered.coverage,
+        material_names=tuple(gathered.material_names),
+        material_name=np.concatenate(named),
         notices=_notices(gathered, lights),
     )
 

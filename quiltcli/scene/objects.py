@@ -38,12 +38,14 @@ class Brought:
         baked: its triangles, in the world.
         surfaces: those of its parts.
         lights: those of its file, in the world.
+        materials: names of its parts' materials, empty where they have none.
     """
 
     asset: Asset
     baked: Baked
     surfaces: tuple[Surface, ...]
     lights: tuple[FileLight, ...]
+    materials: tuple[str, ...] = ()
 
 
 class ObjectError(SceneError):
@@ -130,7 +132,8 @@ def bring(
     if not len(baked.triangles):
         raise SceneError(Problem("every triangle is without area or not finite", str(item.mesh)))
     surfaces = tuple(part.surface.overridden(override) for part in parts)
-    return Brought(asset, baked, surfaces, _placed_lights(lights, matrix))
+    names = tuple(part.material for part in parts)
+    return Brought(asset, baked, surfaces, _placed_lights(lights, matrix), names)
 
 
 def _parts(parts: Sequence[Part], matrix: FloatArray | None, override: dict[str, object]) -> tuple[Part, ...]:

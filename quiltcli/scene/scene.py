@@ -59,6 +59,10 @@ class Scene:
         uv: (V, 2) texture coordinates, v up, NaN where there are none; None when there are none at all.
         coverage: how the areas of the files' polygons compare with those of their triangles.
         lets_light_by: objects that cast no shadows, indices into `objects`.
+        material_names: what materials are called, for mattes.
+        material_name: (T,) index into `material_names`; None for the first everywhere.
+        corner_motion: (T, 9) float32, how the first corner moves until the next frame, and what to add to
+            that for the others; NaN where nobody knows, None where nothing moves or nobody asks.
     """
 
     vertices: FloatArray
@@ -76,6 +80,14 @@ class Scene:
     uv: FloatArray | None = None
     coverage: Coverage = NOTHING
     lets_light_by: tuple[int, ...] = ()
+    material_names: tuple[str, ...] = ("",)
+    material_name: Int32Array | None = None
+    corner_motion: Float32Array | None = None
+
+    @cached_property
+    def named(self) -> Int32Array:
+        """Index (T,) into `material_names`."""
+        return np.zeros_like(self.material) if self.material_name is None else self.material_name
 
     @cached_property
     def planes(self) -> FloatArray:
@@ -115,7 +127,7 @@ class Scene:
     @cached_property
     def corner_colors(self) -> Float32Array | None:
         """The first corner's colour, and what to add for the others (T, 9); None where all are 1."""
-        return None if bool((self.colors == 1).all()) else _corner_table(self.colors, self.triangles)
+        return None if bool((self.colors == 1).all()) else corner_table(self.colors, self.triangles)
 
     def knowing(self, **tables: Any) -> Scene:
         """The same scene with some of the tables above, which need not be worked out then."""
@@ -142,7 +154,7 @@ def corner_normals_of(
     """`Scene.corner_normals` (T, 12) of triangles (T, 3) in planes (4, T), some of which (T,) are flat."""
     table = np.empty((len(triangles), 12), dtype=np.float32)
     own = normalized(planes[:3].T).astype(np.float32)
-    table[:, 0:9] = _corner_table(normals, triangles)
+    table[:, 0:9] = corner_table(normals, triangles)
     table[:, 9:12] = own
     alone = np.flatnonzero(flat)
     table[alone, 0:3] = own[alone]
@@ -150,7 +162,7 @@ def corner_normals_of(
     return table
 
 
-def _corner_table(values: Float32Array, triangles: Int32Array) -> Float32Array:
+def corner_table(values: Float32Array, triangles: Int32Array) -> Float32Array:
     """Values (T, 9) at the first corner, and the second's and third's difference from it."""
     first = values[triangles[:, 0]]
     return np.hstack((first, values[triangles[:, 1]] - first, values[triangles[:, 2]] - first))

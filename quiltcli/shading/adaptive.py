@@ -20,7 +20,7 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.scene import Scene
 from quiltcli.shading.brdf import alpha
 from quiltcli.shading.lights import Middle, asks_for_places, casting, reaches, turns
-from quiltcli.shading.materials import albedo_at, vertex_colors
+from quiltcli.shading.materials import albedo_at, between_corners
 from quiltcli.shading.nodes import NodeColors, nodes_of, points_at_nodes
 from quiltcli.shading.shade import Lamps, Light, Shades, all_lamps, filled, shade, shade_apart
 from quiltcli.shading.shadows import CENTRE, Sample, Shadows, casts
@@ -221,7 +221,7 @@ def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:
     if asks_for_places(scene) or len(squares.weights):
         result &= _FAR * depth_turn < 1
     if scene.corner_colors is not None:
-        hues = vertex_colors(scene.corner_colors, points_at_nodes(squares))
+        hues = between_corners(scene.corner_colors, points_at_nodes(squares))
         result &= (_VARIED * hues.min(axis=1) >= hues.max(axis=1)).all(axis=0)
     # Each lamp: not about to set, not behind the surface as the eye sees it, its image not near.
     rough = alpha(scene, squares.triangle)

@@ -59,7 +59,7 @@ def parameters_of(materials: Materials) -> Parameters:
 
 def tint_at(scene: Scene, seen: Points) -> Colors | None:
     """What multiplies the materials' colours at points, by colour (n, k); None where nothing does."""
-    return None if scene.corner_colors is None else tuple(vertex_colors(scene.corner_colors, seen))
+    return None if scene.corner_colors is None else tuple(between_corners(scene.corner_colors, seen))
 
 
 def albedo_at(scene: Scene, seen: Points) -> Colors:
@@ -80,8 +80,8 @@ def lit_at(scene: Scene, seen: Points) -> Values:
     return at_materials(scene, lit[:, None], seen.triangle)[0]
 
 
-def vertex_colors(table: Float32Array, seen: Points) -> Float32Array:
-    """Colours (3, n, k) between the corners of triangles, by the scene's `corner_colors`."""
+def between_corners(table: Float32Array, seen: Points) -> Float32Array:
+    """Values (3, n, k) between the corners of triangles, by a table (T, 9) such as `Scene.corner_colors`."""
     assert seen.weights is not None
     rows = columns(table, seen.triangle)
     value: Float32Array = rows[3:6] * seen.weights[0]

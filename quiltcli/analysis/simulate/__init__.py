@@ -124,6 +124,8 @@ def simulate(
     stage = set_stage(with_channels(job, ("rgba",)))
     for notice in (*stage.scene.notices, *stage_warnings(stage, frames)):
         say(notice)
+    if job.render.shutter and options.compare:
+        say("the shutter is open: the images have motion blur, the direct picture beside them has none")
     threads = options.threads or default_threads()
     views = [view for view in stage.views(frames) if options.eye in ("", view.eye)]
     if not views:

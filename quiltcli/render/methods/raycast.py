@@ -17,6 +17,7 @@ import numpy as np
 
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
+from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background
 from quiltcli.render.report import FrameRecord
@@ -50,6 +51,7 @@ def cast_frame(
     if only is not None:
         lit &= only
     rays = quilt_rays(stage.layout, lit, viewer.eye)
+    gaze = Gaze(viewer, rays)
     target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     clear(stage, buffers, only)
@@ -59,7 +61,7 @@ def cast_frame(
         pixels = places(address, stage.layout, stage.owners, rays)
         hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals)
         if hits.triangle.size:
-            fill(buffers, stage.job.output.channels, viewer, Shaded(stage.scene, viewer.eye, hits))
+            fill(buffers, stage.job.output.channels, gaze, Shaded(stage.scene, viewer.eye, hits))
         return hits.inside
 
     with ThreadPoolExecutor(threads) as pool:

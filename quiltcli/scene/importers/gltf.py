@@ -199,6 +199,7 @@ def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
         surface=surface_of(gltf.materials[primitive.material]),
         uv=_v_up(primitive.uv[0], piece.copies),
         uv1=_v_up(primitive.uv[1], piece.copies),
+        material=gltf.materials[primitive.material].name,
     )
 
 

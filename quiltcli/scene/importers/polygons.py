@@ -5,6 +5,7 @@ Kd and Ke of MTL are linear, as numbers in a file are.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,8 +44,10 @@ def parts_of_polygons(mesh: PolygonMesh) -> PolygonParts:
     # The material that comes last is the first part: triangles keep the numbers they always had.
     for row in rows[np.argsort(-first, kind="stable")]:
         chosen = triangles.corners[_order(owner == row, counts[triangles.face])]
-        surface = surface_of(mesh.materials[row] if row >= 0 else None, colored=mesh.colors is not None)
-        parts.append(_part(mesh, vertices, chosen, surface))
+        made_of = mesh.materials[row] if row >= 0 else None
+        surface = surface_of(made_of, colored=mesh.colors is not None)
+        part = _part(mesh, vertices, chosen, surface)
+        parts.append(part if made_of is None else replace(part, material=made_of.name))
     return PolygonParts(parts, covered, int(np.count_nonzero(counts < 3)))
 
 
