@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag,
 
 from quiltcli.channels import CHANNELS
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
+from quiltcli.job.lights import MOST_RAYS
 from quiltcli.job.model import (
     YAMLS,
     AnyPath,
@@ -21,6 +22,7 @@ from quiltcli.job.model import (
     Listed,
     Model,
     OneOf,
+    Positive,
     ScenePath,
     Unit,
     YamlPath,
@@ -102,6 +104,15 @@ def _bits(value: Any) -> Any:
     raise complaint(f"expected {either(DEPTH_BITS)}, or no such key, got {describe(value)}")
 
 
+class OcclusionSpec(Model):
+    """What keeps light from places that comes from everywhere."""
+
+    distance: Positive
+    """How far off it may stand, metres."""
+    samples: Annotated[int, Field(ge=1, le=MOST_RAYS)] = 32
+    """Directions in which it is looked for from a pixel; those below the horizon are not."""
+
+
 class RenderSpec(Model):
     """How pixels are made."""
 
@@ -126,6 +137,8 @@ class RenderSpec(Model):
     """Drop triangles that face away from the viewer."""
     shadows: bool = True
     """Draw the shadows of lights that have them."""
+    ambient_occlusion: OcclusionSpec | None = None
+    """Darken places by what is near them, in light from everywhere that has no shadows."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
     anisotropy: Annotated[int, Field(ge=1, le=MOST_PLACES)] = 16

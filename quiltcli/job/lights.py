@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
@@ -10,6 +11,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from quiltcli.job.model import (
     Complaint,
     Direction,
+    ExistingFile,
     Items,
     Model,
     NotNegative,
@@ -24,6 +26,7 @@ from quiltcli.job.model import (
 )
 
 MOST_RAYS = 4096
+PANORAMAS = (".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
 Rays = Annotated[int, Field(ge=1, le=MOST_RAYS)]
 HalfAngle = Annotated[float, Field(allow_inf_nan=False, ge=0, le=90)]
 Lengths2 = Annotated[tuple[Positive, Positive], Items(2, "metres, width and height")]
@@ -115,6 +118,31 @@ class AmbientLight(Model):
     """Kind of light."""
     color: Rgb = (0.1, 0.1, 0.1)
     """Radiance."""
+    shadows: bool = False
+    """Whether what stands around a place keeps light from it."""
+    distance: Positive | None = None
+    """How far off that may stand, metres; without this key anywhere."""
+    rays: Rays = 32
+    """Directions in which it is looked for from a pixel; those below the horizon are not."""
+
+
+class EnvironmentLight(Model):
+    """Light from a picture of all that is around."""
+
+    type: Literal["environment"] = "environment"
+    """Kind of light."""
+    file: Annotated[Path, ExistingFile(PANORAMAS, "a panorama")]
+    """Panorama, twice as wide as high: its middle is towards -Z, +X to its right, +Y at the top."""
+    rotate_deg: Number = 0.0
+    """Turn of the panorama about the vertical, to the left, degrees."""
+    intensity: NotNegative = 1.0
+    """Factor of its radiance."""
+    shadows: bool = True
+    """Whether what stands around a place keeps light from it."""
+    distance: Positive | None = None
+    """How far off that may stand, metres; without this key anywhere."""
+    rays: Rays = 32
+    """Directions in which it is looked for from a pixel, more of them towards what is bright."""
 
 
 class FileLights(Model):
@@ -134,6 +162,7 @@ LIGHTS = {
     "spot": SpotLight,
     "area": AreaLight,
     "ambient": AmbientLight,
+    "environment": EnvironmentLight,
     "file": FileLights,
 }
 
@@ -163,6 +192,7 @@ LightSpec: TypeAlias = Annotated[
     | Annotated[SpotLight, Tag("<SpotLight>")]
     | Annotated[AreaLight, Tag("<AreaLight>")]
     | Annotated[AmbientLight, Tag("<AmbientLight>")]
+    | Annotated[EnvironmentLight, Tag("<EnvironmentLight>")]
     | Annotated[FileLights, Tag("<FileLights>")],
     Discriminator(_light_tag),
     BeforeValidator(_check_type),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeAlias
 
@@ -218,8 +218,16 @@ class SceneFile(FileModel):
 
     def without_shadows(self) -> SceneFile:
         """The same with lights that shine through everything."""
-        lights = [
-            light.model_copy(update={"shadows": False}) if "shadows" in type(light).model_fields else light
+        return self._lit(light.model_copy(update={"shadows": False}) for light in self.lights)
+
+    def with_ambient_occlusion(self, distance: float, rays: int) -> SceneFile:
+        """The same; what is near a place keeps light from it that comes from everywhere."""
+        update = {"shadows": True, "distance": distance, "rays": rays}
+        open_to_all = ("ambient", "environment")
+        return self._lit(
+            light.model_copy(update=update) if light.type in open_to_all and not light.shadows else light
             for light in self.lights
-        ]
+        )
+
+    def _lit(self, lights: Iterable[LightSpec]) -> SceneFile:
         return self.model_copy(update={"lights": tuple(lights)})

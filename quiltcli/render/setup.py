@@ -101,7 +101,10 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
 def scene_spec(job: JobFile) -> SceneFile:
     """The scene file of a job, as the job wants it drawn."""
     spec = load_scene_file(job.scene)
-    return spec if job.render.shadows else spec.without_shadows()
+    near = job.render.ambient_occlusion
+    if not job.render.shadows:
+        spec = spec.without_shadows()
+    return spec if near is None else spec.with_ambient_occlusion(near.distance, near.samples)
 
 
 def texture_limits(job: JobFile) -> TextureLimits:

@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from quiltcli.errors import SceneError
 from quiltcli.geometry import Float32Array, FloatArray, cross, normalized
+from quiltcli.scene.environment.maps import Maps, maps_of
+from quiltcli.scene.environment.panorama import read_panorama
 
 if TYPE_CHECKING:
-    from quiltcli.job.lights import AreaLight, LightSpec, SpotLight
+    from quiltcli.job.lights import AreaLight, EnvironmentLight, LightSpec, SpotLight
 
 HEADLIGHT = 3.0
 """Irradiance of the light at the eye; a white surface that faces it comes out near 1."""
@@ -39,10 +42,35 @@ class Light:
 
 
 @dataclass(frozen=True, eq=False)
-class Ambient(Light):
+class Everywhere(Light):
+    """Light from everywhere, which what stands around a place may keep from it.
+
+    Attributes:
+        distance: how far off that may stand, metres.
+        rays: directions in which it is looked for from a pixel.
+    """
+
+    distance: float = field(default=math.inf, kw_only=True)
+    rays: int = field(default=32, kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Ambient(Everywhere):
     """The same light from everywhere; `color` is its radiance."""
 
     kind: ClassVar[str] = "ambient"
+
+
+@dataclass(frozen=True, eq=False)
+class Environment(Everywhere):
+    """Light from a picture of all that is around; `color` is a factor of its radiance.
+
+    Attributes:
+        maps: what surfaces receive of it, and what they mirror.
+    """
+
+    kind: ClassVar[str] = "environment"
+    maps: Maps
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +153,7 @@ class Headlight(Light):
     kind: ClassVar[str] = "headlight"
 
 
-KINDS: tuple[type[Light], ...] = (Directional, Point, Spot, Area, Ambient, Headlight)
+KINDS: tuple[type[Light], ...] = (Directional, Point, Spot, Area, Ambient, Environment, Headlight)
 """All kinds."""
 
 
@@ -215,11 +243,14 @@ def default_lights() -> tuple[Light, ...]:
 def lights_of(specs: Sequence[LightSpec]) -> tuple[Light, ...]:
     """The lights that a scene file asks for, by kind: their sum does not depend on how it lists them.
 
-    Ambient lights are one: what comes from everywhere cannot be told apart.
+    Ambient lights are one unless they cast shadows: what comes from everywhere cannot be told apart.
+
+    Raises:
+        SceneError: a panorama cannot be read.
     """
     if not specs:
         return default_lights()
-    around = [spec.color for spec in specs if spec.type == "ambient"]
+    around = [spec.color for spec in specs if spec.type == "ambient" and not spec.shadows]
     rows: list[Light] = [ambient(np.sum(around, axis=0).tolist())] if np.any(around) else []
     for kind in KINDS:
         rows += _of_kind(kind.kind, specs)
@@ -238,6 +269,11 @@ def _of_kind(kind: str, specs: Sequence[LightSpec]) -> Iterator[Light]:
             yield _spot(spec)
         elif spec.type == "area":
             yield _area(spec)
+        elif spec.type == "environment":
+            yield _environment(spec)
+        elif spec.type == "ambient" and spec.shadows:
+            distance = spec.distance or math.inf
+            yield Ambient(_single(spec.color), shadows=True, distance=distance, rays=spec.rays)
 
 
 def _spot(spec: SpotLight) -> Spot:
@@ -254,6 +290,26 @@ def _area(spec: AreaLight) -> Area:
         roll,
         spec.color,
         shadows=spec.shadows,
+        rays=spec.rays,
+    )
+
+
+def _environment(spec: EnvironmentLight) -> Environment:
+    """An environment, its panorama read.
+
+    Raises:
+        SceneError: the panorama cannot be read.
+    """
+    try:
+        maps = maps_of(read_panorama(spec.file), spec.rotate_deg)
+    except SceneError as error:
+        problems = [spec.source.problem(("file",), str(problem)) for problem in error.problems]
+        raise SceneError(problems) from error
+    return Environment(
+        _single((spec.intensity,) * 3),
+        maps,
+        shadows=spec.shadows,
+        distance=spec.distance or math.inf,
         rays=spec.rays,
     )
 

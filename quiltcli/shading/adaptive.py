@@ -18,8 +18,8 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.scene import Scene
-from quiltcli.shading.brdf import alpha
-from quiltcli.shading.lights import Middle, asks_for_places, casting, reaches, turns
+from quiltcli.shading.brdf import alpha, mirrors
+from quiltcli.shading.lights import Middle, asks_for_places, casting, has_surroundings, reaches, turns
 from quiltcli.shading.materials import albedo_at, between_corners, emission_at, occlusion_at
 from quiltcli.shading.nodes import NodeColors, nodes_of, points_at_nodes
 from quiltcli.shading.shade import Lamps, Light, Shades, all_lamps, filled, shade, shade_apart
@@ -309,6 +309,9 @@ def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:
     if scene.corner_colors is not None:
         hues = between_corners(scene.corner_colors, points_at_nodes(squares))
         result &= (_VARIED * hues.min(axis=1) >= hues.max(axis=1)).all(axis=0)
+    if has_surroundings(scene):
+        # Its maps bend from texel to texel: light is the same where normals are, unless mirrored.
+        result &= (normal_turn == 0) & ~mirrors(scene, squares.triangle)
     # Each lamp: not about to set, not behind the surface as the eye sees it, its image not near.
     rough = alpha(scene, squares.triangle)
     for lamp, lamp_turn in turns(scene, middle):

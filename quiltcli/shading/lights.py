@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray
-from quiltcli.scene.lights import Ambient, Area, Directional, Headlight, Light, Point, Spot
+from quiltcli.scene.lights import Ambient, Area, Directional, Environment, Headlight, Light, Point, Spot
 from quiltcli.scene.scene import Scene
+from quiltcli.shading.environment import Around, around
 from quiltcli.shading.nodes import Nodes, nodes_of
 from quiltcli.shading.rectangle import Received, mirrored_place, received_from
 from quiltcli.shading.shadows import Shadows, casts
@@ -42,6 +43,8 @@ class Arrival:
         vl: (n, k) cosine between eye and lamp; None where nobody asked.
         received: (n, k) or (n, 1) share of `color` that a surface receives; None for light from everywhere.
         image: what a layer that reflects makes of it, where that differs: of a lamp with a size.
+        around: what comes from an environment, instead of all the others.
+        shown: (n, k) share of light from everywhere that nothing hides; None for all.
     """
 
     color: Float32Array
@@ -49,6 +52,8 @@ class Arrival:
     vl: Float32Array | None = None
     received: Float32Array | None = None
     image: Image | None = None
+    around: Around | None = None
+    shown: Float32Array | None = None
 
 
 @dataclass(frozen=True)
@@ -133,14 +138,18 @@ def arrivals(
     """
     for light in lights:
         arrival = KINDS[type(light)].arriving(light, surface, to_eye)
-        if shadows is not None and casts(light) and arrival.received is not None:
-            arrival = shaded(arrival, shadows.shown(light, arrival.received > 0))
+        if shadows is not None and casts(light):
+            reached = np.ones((1, 1), np.bool_) if arrival.received is None else arrival.received > 0
+            arrival = shaded(arrival, shadows.shown(light, reached))
         yield arrival
 
 
 def shaded(arrival: Arrival, shown: Float32Array) -> Arrival:
     """An arrival of which a share (n, k) is shown."""
-    assert arrival.received is not None
+    if arrival.around is not None:
+        return replace(arrival, around=replace(arrival.around, shown=shown))
+    if arrival.received is None:
+        return replace(arrival, shown=shown)
     image = arrival.image
     if image is not None:
         image = replace(image, received=image.received * shown)
@@ -150,8 +159,20 @@ def shaded(arrival: Arrival, shown: Float32Array) -> Arrival:
 def reaches(light: Light, surface: Surface) -> BoolArray:
     """Whether a lamp's light, if nothing hides it, reaches some point (k,) of n groups."""
     received = KINDS[type(light)].arriving(light, surface, False).received
-    assert received is not None
+    if received is None:
+        return np.ones(1, dtype=np.bool_)
     return np.asarray((received > 0).any(axis=0))
+
+
+def has_surroundings(scene: Scene) -> bool:
+    """Whether light of a scene comes from a picture of all that is around."""
+    return any(isinstance(light, Environment) for light in scene.lights)
+
+
+def is_grey(light: Light) -> bool:
+    """Whether a lamp's light has no colour."""
+    red, green, blue = light.color
+    return bool(red == green == blue) and not isinstance(light, Environment)
 
 
 def casting(scene: Scene) -> tuple[Light, ...]:
@@ -186,6 +207,10 @@ def asks_for_places(scene: Scene) -> bool:
 
 def _everywhere(light: Ambient, surface: Surface, to_eye: bool) -> Arrival:
     return Arrival(light.color)
+
+
+def _around(light: Environment, surface: Surface, to_eye: bool) -> Arrival:
+    return Arrival(light.color, around=around(light, surface))
 
 
 def _from_afar(light: Directional, surface: Surface, to_eye: bool) -> Arrival:
@@ -309,6 +334,7 @@ def _to_eye(surface: Surface, out: Float32Array) -> Float32Array:
 
 KINDS: dict[type[Light], Kind] = {
     Ambient: Kind(_everywhere, None),
+    Environment: Kind(_around, None),
     Directional: Kind(_from_afar, _afar),
     Point: Kind(_from_place, _place, placed=True),
     Spot: Kind(_from_spot, _spot_place, placed=True),

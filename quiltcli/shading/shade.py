@@ -20,7 +20,8 @@ from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.scene import Light as Lamp
 from quiltcli.scene import Scene
 from quiltcli.shading.brdf import Layer, Lobes, glints, layer_of, let_in_and_out, lobes_at
-from quiltcli.shading.lights import Arrival, arrivals, asks_for_places, casting
+from quiltcli.shading.environment import from_around
+from quiltcli.shading.lights import Arrival, arrivals, asks_for_places, casting, is_grey
 from quiltcli.shading.materials import Colors, Values, albedo_wants, lit_at
 from quiltcli.shading.shadows import Sample, Shadows
 from quiltcli.shading.surface import Surface
@@ -100,12 +101,12 @@ def shade(scene: Scene, eye: FloatArray, seen: Points, lamps: Lamps | None = Non
     lamps = lamps or all_lamps(scene)
     surface, lobes = Surface(seen, eye), lobes_at(scene, seen)
     base, total = lobes.base, list(lobes.emission) if lamps.emits else _nothing(3)
-    if _is_grey(base) and _is_grey(total) and all(_is_grey(light.color) for light in lamps.lights):
+    if _is_grey(base) and _is_grey(total) and all(map(is_grey, lamps.lights)):
         base, total = base[:1], total[:1]
     layer = layer_of(surface, lobes, base)
     shadows = lamps.shadows(scene, surface)
     for arrival in arrivals(lamps.lights, surface, shadows, to_eye=layer is not None):
-        for k, part, glint in _reflected(lobes, base, layer, arrival):
+        for k, part, glint in _reflected(surface, lobes, base, layer, arrival):
             if glint is not None:
                 part = np.add(part, glint, out=_into(part, glint))
             total[k] = np.add(part, total[k], out=_into(part, total[k]))
@@ -120,7 +121,7 @@ def shade_apart(scene: Scene, eye: FloatArray, seen: Points, lamps: Lamps | None
     """
     lamps = lamps or all_lamps(scene)
     surface, lobes = Surface(seen, eye), lobes_at(scene, seen)
-    grey = all(_is_grey(light.color) for light in lamps.lights)
+    grey = all(map(is_grey, lamps.lights))
     base = lobes.base
     if grey and (_is_grey(base) or not np.any(lobes.metallic)):
         base = base[:1]
@@ -130,7 +131,7 @@ def shade_apart(scene: Scene, eye: FloatArray, seen: Points, lamps: Lamps | None
     diffuse, specular, around = (_nothing(len(base)) for _ in range(3))
     shadows = lamps.shadows(scene, surface)
     for arrival in arrivals(lamps.lights, surface, shadows, to_eye=layer is not None):
-        for k, part, glint in _reflected(bare, white, layer, arrival):
+        for k, part, glint in _reflected(surface, bare, white, layer, arrival):
             diffuse[k] = diffuse[k] + part
             if arrival.nl is None:
                 around[k] = around[k] + part
@@ -146,7 +147,7 @@ def shade_apart(scene: Scene, eye: FloatArray, seen: Points, lamps: Lamps | None
 
 
 def _reflected(
-    lobes: Lobes, base: Colors, layer: Layer | None, arrival: Arrival
+    surface: Surface, lobes: Lobes, base: Colors, layer: Layer | None, arrival: Arrival
 ) -> Iterator[tuple[int, Values, Float32Array | None]]:
     """What one lamp sends to the eye by way of each point.
 
@@ -154,11 +155,16 @@ def _reflected(
         for each colour its number, what the base returns, and what the layer above it reflects. The former
         is nobody else's.
     """
+    if arrival.around is not None:
+        for k, part, glint in from_around(arrival.around, surface, lobes, base, layer):
+            yield k, part if lobes.open is None else part * lobes.open, glint
+        return
     # From everywhere: what is the same at all points of a group first.
     if arrival.nl is None or arrival.received is None:
         for k in range(len(base)):
             part = lobes.paint[k] * arrival.color[k]
             part = part if lobes.tint is None else part * lobes.tint[k]
+            part = part if arrival.shown is None else part * arrival.shown
             yield k, part if lobes.open is None else part * lobes.open, None
         return
     received: Float32Array = arrival.received

@@ -15,7 +15,17 @@ from typing import Any
 import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, normalized
-from quiltcli.scene.lights import Area, Directional, Light, Point, Spot
+from quiltcli.scene.environment.panorama import cell_directions, cell_sizes
+from quiltcli.scene.lights import (
+    Ambient,
+    Area,
+    Directional,
+    Environment,
+    Everywhere,
+    Light,
+    Point,
+    Spot,
+)
 from quiltcli.scene.scene import Scene
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.rays.blockers import Blockers, blockers_of
@@ -177,6 +187,56 @@ def _area(light: Area, starts: Starts, shadows: Shadows) -> Float32Array:
     return result
 
 
+def _everywhere(light: Everywhere, starts: Starts, shadows: Shadows) -> Float32Array:
+    """Of the light from directions above the horizon, that from those in which nothing stands near."""
+    count = 1 << max(-(-light.rays // shadows.sample.count) - 1, 0).bit_length()
+    seen, all_of_it = np.zeros((2, starts.places.shape[1]), dtype=np.float32)
+    far = min(light.distance, _AFAR)
+    for way, weight in zip(*_directions_of(light, count, shadows.sample), strict=True):
+        light_of_it = sum_of_products(starts.normals, way)
+        rows = np.flatnonzero(light_of_it > 0)
+        if not rows.size:
+            continue
+        light_of_it = light_of_it[rows] * weight
+        hidden = shadows.blockers.hide(starts.places[:, rows], way[:, None], far)
+        all_of_it[rows] += light_of_it
+        seen[rows] += np.where(hidden, np.float32(0), light_of_it)
+    result: Float32Array = np.divide(seen, all_of_it, out=np.ones_like(seen), where=all_of_it > 0)
+    return result
+
+
+@lru_cache(maxsize=64)
+def _directions_of(light: Everywhere, count: int, sample: Sample) -> tuple[Float32Array, Float32Array]:
+    """Directions (count, 3) in the world for one of a pixel's samples, and what light from each counts.
+
+    The same for all pixels. Half of them are spread evenly, half towards what is bright.
+    """
+    across, down = (np.array(places(count, sample)).T + 1) / 2
+    height = 2 * down - 1
+    if not isinstance(light, Environment):
+        turn = 2 * np.pi * across
+        flat = np.sqrt(1 - height * height)
+        ways = np.stack((flat * np.sin(turn), height, flat * np.cos(turn)), axis=1)
+        return ways.astype(np.float32), np.ones(count, dtype=np.float32)
+    cells = light.maps.cells.astype(np.float64).mean(axis=2)
+    columns = cells.shape[1]
+    size = np.repeat(cell_sizes(columns), columns).reshape(cells.shape)
+    bright = cells * size
+    chance = size / size.sum() + (bright / bright.sum() if bright.sum() > 0 else 0)
+    chance /= chance.sum()
+    row = _found(chance.sum(axis=1), down)
+    column = np.array([_found(chance[r], a) for r, a in zip(row, across, strict=True)])
+    ways = cell_directions(columns)[row, column] @ light.maps.turn.T
+    weight = (cells * size / chance)[row, column]
+    return ways.astype(np.float32), np.maximum(weight, 1e-12).astype(np.float32)
+
+
+def _found(chance: FloatArray, place: FloatArray | float) -> Any:
+    """Which of some things with these chances lies at places from 0 to 1."""
+    total = np.cumsum(chance)
+    return np.minimum(np.searchsorted(total, np.asarray(place) * total[-1], side="right"), chance.size - 1)
+
+
 def _blocks(rays: int, sample: Sample) -> tuple[int, int]:
     """How many places a sample looks for at first, and at most: powers of two.
 
@@ -230,6 +290,8 @@ _SHOWN: dict[type[Light], Callable[[Any, Starts, Shadows], Float32Array]] = {
     Point: _point,
     Spot: _point,
     Area: _area,
+    Ambient: _everywhere,
+    Environment: _everywhere,
 }
 
 
