@@ -21,7 +21,7 @@ from quiltcli.shading.materials import Values
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.resolve.vectors import sum_of_products, vector_values
 
-_ONE, _HALF = np.float32(1), np.float32(0.5)
+_ONE = np.float32(1)
 _TABLE = 32
 _STRATA = 32
 _LEAST = np.float32(1e-20)
@@ -115,8 +115,8 @@ def _between_levels(mirrors: tuple[Float32Array, ...], way: Float32Array, roughn
 
 
 def looked_up(texels: Float32Array, way: Float32Array) -> Float32Array:
-    """Values (3, …) of a map with its border, between its texels' middles, in directions (3, …)."""
-    size = len(texels) - 2
+    """Values (3, …) between the places of a map, in directions (3, …) of any length."""
+    size = len(texels)
     x, y, z = way
     over = np.reciprocal(np.maximum(np.abs(x) + np.abs(y) + np.abs(z), _LEAST))
     u, v = x * over, z * over
@@ -124,11 +124,11 @@ def looked_up(texels: Float32Array, way: Float32Array) -> Float32Array:
     folded_v = np.copysign(_ONE - np.abs(u), v)
     under = y < 0
     u, v = np.where(under, folded_u, u), np.where(under, folded_v, v)
-    half = np.float32(size / 2)
-    u, v = u * half + (half + _HALF), v * half + (half + _HALF)
-    column, row = (np.clip(each.astype(np.int32), 0, size) for each in (u, v))
-    u, v = u - column, v - row
-    flat, stride = texels.reshape(-1, 3), size + 2
+    half = np.float32((size - 1) / 2)
+    u, v = u * half + half, v * half + half
+    column, row = (np.clip(each.astype(np.int32), 0, size - 2) for each in (u, v))
+    u, v = u - column.astype(np.float32), v - row.astype(np.float32)
+    flat, stride = texels.reshape(-1, 3), size
     corner = row * stride + column
 
     def taken(offset: int) -> Float32Array:
@@ -147,7 +147,7 @@ def _albedo_parts(cosine: Float32Array, roughness: Values) -> tuple[Float32Array
     down = np.minimum(np.asarray(roughness), _ONE) * np.float32(_TABLE - 1)
     column = np.minimum(across.astype(np.int32), _TABLE - 2)
     row = np.minimum(down.astype(np.int32), _TABLE - 2)
-    u, v = across - column, down - row
+    u, v = across - column.astype(np.float32), down - row.astype(np.float32)
     corner = row * _TABLE + column
 
     def part(values: Float32Array) -> Float32Array:

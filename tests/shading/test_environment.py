@@ -119,11 +119,9 @@ def test_maps_have_no_seams(sky):
 
 def test_a_map_of_directions_is_looked_up_where_they_are():
     """A map of its own texels' directions gives any direction back."""
-    size = 64
-    bordered = np.pad(texel_directions(size), ((1, 1), (1, 1), (0, 0)), mode="edge").astype(np.float32)
+    texels = texel_directions(65).astype(np.float32)
     way = normalized(np.random.default_rng(5).normal(size=(500, 3)))
-    way = way[np.abs(way).min(axis=1) > 0.1]
-    found = looked_up(bordered, np.float32(way).T[:, :, None])[:, :, 0].T
+    found = looked_up(texels, np.float32(way).T[:, :, None])[:, :, 0].T
     assert np.linalg.norm(normalized(found.astype(float)) - way, axis=1).max() < 0.01
 
 

@@ -1,8 +1,8 @@
 """Maps of light from all around: what surfaces of any normal receive, and what mirrors show.
 
-A map is a square of texels for all directions: the octahedron |x| + |y| + |z| = 1, unfolded around +Y, its
-lower faces folded outward (Praun and Hoppe 2003). No angle is needed to look it up. Around it lies
-a border of the texels that are its neighbours on the octahedron.
+A map is a square grid of places for all directions: the octahedron |x| + |y| + |z| = 1, unfolded around +Y,
+its lower faces folded outward (Praun and Hoppe 2003). No angle is needed to look it up. Its outermost places
+lie on the square's edges, which are edges of the octahedron: it goes on there without a border.
 
 All of it is sums over the cells of a reduced panorama, in double precision, rounded to half floats: so all
 machines have the same maps, and a panorama of one colour has maps of exactly that.
@@ -21,14 +21,14 @@ from quiltcli.channels import MOST_HALF
 from quiltcli.geometry import Float32Array, FloatArray, rotation_deg, slices
 from quiltcli.scene.environment.panorama import cell_directions, cell_sizes, reduced
 
-_DIFFUSE = 48
+_DIFFUSE = 49
 _COARSE, _FINE = 96, 128
 """Cells around the horizon from which rough and less rough mirrors are made."""
 ROUGHNESS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-_SIZES = (256, 64, 32, 24, 24, 24)
+_SIZES = (257, 65, 33, 25, 25, 25)
 _AT_ONCE = 256
 _PLACES = 4
-"""Places across and down a texel of the sharpest map at which the panorama is looked up."""
+"""Looks across and down a place of the sharpest map, at what lies around it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Maps:
     """Maps of one environment, in the world's directions.
 
     Attributes:
-        diffuse: (50, 50, 3) irradiance over π by normal.
+        diffuse: (49, 49, 3) irradiance over π by normal.
         mirrors: (n, n, 3) by direction, radiance as mirrors of the roughnesses `ROUGHNESS` show it.
         cells: (64, 128, 3) radiance of a panorama's cells, before it is turned.
         turn: (3, 3) from its directions to the world's.
@@ -73,11 +73,11 @@ def _made(panorama: _Panorama, rotate_deg: float) -> Maps:
     turn = rotation_deg((0.0, rotate_deg, 0.0))
     picture = panorama.picture
     coarse, fine = (_Light(reduced(picture, width), width, turn) for width in (_COARSE, _FINE))
-    mirrors = [_bordered(_sharp(picture, turn))]
+    mirrors = [_rounded(_sharp(picture, turn))]
     for roughness, size in zip(ROUGHNESS[1:], _SIZES[1:], strict=True):
         light = fine if roughness < 0.3 else coarse
-        mirrors.append(_bordered(light.seen(size, _blurred(roughness))))
-    diffuse = _bordered(coarse.seen(_DIFFUSE, lambda cosine: cosine))
+        mirrors.append(_rounded(light.seen(size, _blurred(roughness))))
+    diffuse = _rounded(coarse.seen(_DIFFUSE, lambda cosine: cosine))
     return Maps(diffuse, tuple(mirrors), fine.radiance.astype(np.float32), turn)
 
 
@@ -131,9 +131,11 @@ def _blurred(roughness: float) -> Callable[[FloatArray], FloatArray]:
 
 
 def _sharp(picture: Float32Array, turn: FloatArray) -> FloatArray:
-    """What a perfect mirror shows, the mean of places in each texel."""
+    """What a perfect mirror shows, the mean about each place."""
     size = _SIZES[0]
-    ways = texel_directions(size * _PLACES) @ turn  # back into the panorama's directions
+    middle = np.linspace(-1, 1, size)[:, None]
+    around = ((np.arange(_PLACES) + 0.5) / _PLACES - 0.5) * (2 / (size - 1))
+    ways = _directions(np.clip(middle + around, -1, 1).ravel()) @ turn  # back into the panorama's directions
     height, width = picture.shape[:2]
     row = np.arccos(np.clip(ways[..., 1], -1, 1)) / np.pi * height
     column = (np.arctan2(ways[..., 0], -ways[..., 2]) / (2 * np.pi) + 0.5) * width
@@ -142,8 +144,12 @@ def _sharp(picture: Float32Array, turn: FloatArray) -> FloatArray:
 
 
 def texel_directions(size: int) -> FloatArray:
-    """Unit directions (size, size, 3) to the middles of a map's texels, by row (z) and column (x)."""
-    line = (np.arange(size) + 0.5) / size * 2 - 1
+    """Unit directions (size, size, 3) of a map's places, by row (z) and column (x)."""
+    return _directions(np.linspace(-1, 1, size))
+
+
+def _directions(line: FloatArray) -> FloatArray:
+    """Unit directions (n, n, 3) of the square's places with these coordinates (n,) in both axes."""
     x, z = np.meshgrid(line, line)
     y = 1 - np.abs(x) - np.abs(z)
     fold_x, fold_z = (1 - np.abs(z)) * np.where(x < 0, -1, 1), (1 - np.abs(x)) * np.where(z < 0, -1, 1)
@@ -151,15 +157,6 @@ def texel_directions(size: int) -> FloatArray:
     return np.asarray(ways / np.linalg.norm(ways, axis=-1, keepdims=True))
 
 
-def _bordered(texels: FloatArray) -> Float32Array:
-    """A map (n + 2, n + 2, 3) with its border, its values those of half floats."""
-    size = len(texels)
-    result = np.zeros((size + 2, size + 2, 3))
-    result[1:-1, 1:-1] = texels
-    # An edge of the square is folded in the middle: its texels' neighbours are those of the other half.
-    result[0, 1:-1], result[-1, 1:-1] = texels[0, ::-1], texels[-1, ::-1]
-    result[1:-1, 0], result[1:-1, -1] = texels[::-1, 0], texels[::-1, -1]
-    for row in (0, -1):
-        for column in (0, -1):
-            result[row, column] = texels[row, column]  # all four are around −Y
-    return np.minimum(result, MOST_HALF).astype(np.float16).astype(np.float32)
+def _rounded(texels: FloatArray) -> Float32Array:
+    """Values that are half floats'."""
+    return np.minimum(texels, MOST_HALF).astype(np.float16).astype(np.float32)
