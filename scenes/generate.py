@@ -162,6 +162,36 @@ def plate() -> Mesh:
     return mesh
 
 
+def mosaic() -> Mesh:
+    """A round floor 1 m wide at height 0, one polygon; its texture coordinates are its places from above."""
+    mesh = Mesh()
+    turns = [2 * math.pi * k / 64 for k in range(64)]
+    first = mesh.add_points([(0.5 * math.cos(t), 0, -0.5 * math.sin(t)) for t in turns])
+    mesh.faces.append(tuple(range(first, first + 64)))
+    return mesh
+
+
+def pavilion() -> Mesh:
+    """Eight columns under a ring, on a round step below height 0; 1 m wide, 0.62 m high, for `mosaic`."""
+    mesh = Mesh()
+    paint(mesh, "chalk")
+    turn(mesh, [(0, -0.05), (0.49, -0.05), (0.5, -0.04), (0.5, 0)], 64)
+    column = [(0.045, 0), (0.045, 0.02), (0.03, 0.03), (0.024, 0.44), (0.024, 0.46), (0.042, 0.47), (0.042, 0.49)]
+    for k in range(8):
+        angle = 2 * math.pi * (k + 0.5) / 8
+        turn(mesh, [(0, 0), *column, (0, 0.49)], 20, (0.43 * math.cos(angle), 0.43 * math.sin(angle)))
+    ring = [(0.37, 0.49), (0.49, 0.49), (0.49, 0.53), (0.5, 0.54), (0.5, 0.57), (0.38, 0.57), (0.37, 0.56)]
+    turn(mesh, [*ring, ring[0]], 64)
+    return mesh
+
+
+def turn(mesh: Mesh, profile: list[tuple[float, float]], sides: int, at: tuple[float, float] = (0, 0)) -> None:
+    """Add what a profile makes around an upright axis at a place."""
+    part = revolved(profile, sides)
+    first = mesh.add_points([(x + at[0], y, z + at[1]) for x, y, z in part.vertices])
+    mesh.faces += [tuple(first + corner for corner in face) for face in part.faces]
+
+
 def room() -> Mesh:
     """A room of 6 m × 6 m, 3.2 m high, seen from inside: tiled floor, coloured walls, a beamed ceiling."""
     mesh = Mesh()
@@ -209,9 +239,15 @@ MESHES: dict[str, Callable[[], Mesh]] = {
     "board": board,
     "dish": dish,
     "plate": plate,
+    "mosaic": mosaic,
+    "pavilion": pavilion,
     "room": room,
     "table": table,
 }
+
+
+SEEN_FROM_ABOVE = {"mosaic"}
+"""Meshes whose texture coordinates are x and −z, from 0 to 1 over a metre."""
 
 
 def obj_text(name: str) -> str:
@@ -221,12 +257,15 @@ def obj_text(name: str) -> str:
     if mesh.names:
         lines.append(f"mtllib {name}.mtl")
     lines += ["v " + " ".join(f"{round(c, 6) + 0.0:.6g}" for c in point) for point in mesh.vertices]
+    if name in SEEN_FROM_ABOVE:
+        lines += [f"vt {x + 0.5:.6g} {0.5 - z:.6g}" for x, _, z in mesh.vertices]
     current = ""
     for index, face in enumerate(mesh.faces):
         if mesh.names.get(index, current) != current:
             current = mesh.names[index]
             lines.append(f"usemtl {current}")
-        lines.append("f " + " ".join(str(corner + 1) for corner in face))
+        pattern = "{0}/{0}" if name in SEEN_FROM_ABOVE else "{0}"
+        lines.append("f " + " ".join(pattern.format(corner + 1) for corner in face))
     return "\n".join(lines) + "\n"
 
 
