@@ -19,7 +19,7 @@ from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
 from quiltcli.formats.mesh.read import SUFFIXES
 from quiltcli.formats.yaml.source import parse_yaml
-from quiltcli.images.names import layout_path
+from quiltcli.images.names import layout_path, names_problems
 from quiltcli.job import (
     JobFile,
     PackSpec,
@@ -162,6 +162,7 @@ def _check_job(findings: _Findings, path: Path) -> None:
     placed = findings.run(layout_for, choice, facets, layout_path(job.output.directory))
     if placed is not None:
         findings.run(demand_memory, job, placed)
+        findings.problems += names_problems(job, len(placed.pages), placed.facet.size)
         if facets is not None and not found:
             findings.notices += job_warnings(job, facets, placed)
     if facets is None and isinstance(choice, Path):

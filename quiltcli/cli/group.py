@@ -12,6 +12,7 @@ from quiltcli.ending import end_by_error, ended
 from quiltcli.errors import QuiltError
 
 COMMANDS = (
+    "assemble",
     "cameras",
     "check",
     "compare",
@@ -25,6 +26,7 @@ COMMANDS = (
     "path",
     "pattern",
     "preview",
+    "project",
     "render",
     "schema",
     "simulate",

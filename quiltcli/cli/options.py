@@ -153,6 +153,13 @@ SETS = click.option(
     help="Set a value of the job, by dotted path.",
 )
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace images that exist.")
+COLORSPACE = click.option(
+    "--colorspace",
+    type=click.Choice(("auto", "srgb", "linear")),
+    default="auto",
+    show_default=True,
+    help="What numbers of pictures mean; auto takes whole numbers for sRGB, floats for light.",
+)
 EXPOSURE = click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
 
 

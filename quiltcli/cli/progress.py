@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
     from quiltcli.render.report import FrameRecord
+    from quiltcli.render.sequence import Listener
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,26 @@ class Progress:
     begin: Callable[[int], None]
     frame_done: Callable[[FrameRecord], None]
     say: Callable[[str], None]
+
+
+def watched(work: Callable[[Listener], list[FrameRecord]]) -> list[FrameRecord]:
+    """Do what makes frames, with its progress on stderr; a signal that stops it ends the program.
+
+    What many frames have warned of is said once they are done.
+    """
+    from quiltcli.render.interrupt import Stopped
+    from quiltcli.render.report import summary_warnings
+    from quiltcli.render.sequence import Listener
+
+    with progress() as shown:
+        try:
+            records = work(Listener(shown.begin, shown.frame_done, shown.say))
+        except Stopped as stopped:
+            shown.say(str(stopped))
+            sys.exit(stopped.exit_code)
+    for warning in summary_warnings(records):
+        sys.stderr.write(f"warning: {warning}\n")
+    return records
 
 
 @contextlib.contextmanager

@@ -56,24 +56,16 @@ def render(
 
 def _render(job: Any, options: Any, scheduler: str | None) -> Any:
     """Render here or on a farm, with progress on stderr and the summary on stdout."""
-    from quiltcli.cli.progress import progress
+    from quiltcli.cli.progress import watched
     from quiltcli.render.farm import render_on
-    from quiltcli.render.interrupt import Stopped
-    from quiltcli.render.report import summary_warnings
-    from quiltcli.render.sequence import Listener
     from quiltcli.render.sequence import render as render_here
 
-    def work(*given: Any) -> Any:
-        return render_here(*given) if scheduler is None else render_on(scheduler, *given)
+    def work(listener: Any) -> Any:
+        if scheduler is None:
+            return render_here(job, options, listener)
+        return render_on(scheduler, job, options, listener)
 
-    with progress() as shown:
-        try:
-            records = work(job, options, Listener(shown.begin, shown.frame_done, shown.say))
-        except Stopped as stopped:
-            shown.say(str(stopped))
-            sys.exit(stopped.exit_code)
-    for warning in summary_warnings(records):
-        click.echo(f"warning: {warning}", err=True)
+    records = watched(work)
     if options.dry_run:
         click.echo("nothing is wrong with this job")
     elif records:

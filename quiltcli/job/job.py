@@ -29,6 +29,7 @@ from quiltcli.job.model import (
     either,
     exactly_one,
 )
+from quiltcli.job.names import NamesSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
 METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
@@ -174,6 +175,8 @@ class OutputSpec(Model):
     """Images of facets that face away from the viewer: written, hard links to one of their size, or none."""
     data_window: Annotated[str, OneOf(DATA_WINDOWS)] = "full"
     """Pixels in a file: all of the page or facet, or no margins that show nothing (tight)."""
+    names: NamesSpec = NamesSpec()
+    """Names of the images."""
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Something is written, and nothing twice."""
@@ -237,6 +240,9 @@ class JobFile(FileModel):
         if self.viewer is not None and self.viewer.facets is not None:
             yield ("viewer", "facets"), "belongs to one of several viewers (expected viewers: {NAME: …})"
         yield from _shared_facets(self.viewers or {})
+        if (self.viewer or self.viewers) and self.is_stereo and self.output.stereo == "files":
+            written = (("page", self.output.quilts), ("facet", self.output.facets))
+            yield from self.output.names.lacking_eyes([kind for kind, wanted in written if wanted])
         if self.render.clip == "distance" and "zv" in self.output.channels:
             words = "zv lies between a near and a far plane (expected planar or auto), got distance"
             yield ("render", "clip"), words

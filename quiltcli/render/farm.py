@@ -71,7 +71,7 @@ def render_on(
     listener.begin(len(ready.views))
     if options.dry_run:
         return []
-    clear_away(ready.stage, ready.out, ready.views)
+    clear_away(ready.stage, ready.out)
     if not ready.views:
         return []
     with _connected(distributed, address) as client, stop_between_frames("") as request:
@@ -82,7 +82,7 @@ def render_on(
         groups = by_file(ready.views)
         tasks = [Task(folder / "job.yaml", ready.out.job_sha, views, options) for views in groups]
         records = _collect(client, watch, tasks, listener)
-    clear_away(ready.stage, ready.out, ready.views)  # what workers that died have left
+    clear_away(ready.stage, ready.out)  # what workers that died have left
     return records
 
 

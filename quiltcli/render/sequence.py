@@ -134,7 +134,7 @@ def render(
         listener.say(notice)
     if options.dry_run:
         return []
-    clear_away(ready.stage, ready.out, ready.views)
+    clear_away(ready.stage, ready.out)
     if not ready.views:
         return []
     with failing_run(of_the_disk=True):

@@ -12,7 +12,7 @@ import numpy as np
 from quiltcli.display import Facets, load_display
 from quiltcli.errors import JobError, SceneError, raise_all
 from quiltcli.geometry import OwnerArray
-from quiltcli.images.names import layout_path
+from quiltcli.images.names import Names, layout_path, names_of, names_problems
 from quiltcli.job import JobFile, PackSpec, SceneFile, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
@@ -58,6 +58,11 @@ class Stage:
         """What near and far cut in all frames, `planar` or `distance`."""
         return settled_clip(self.job, self.facets)
 
+    @cached_property
+    def names(self) -> Names:
+        """How the images are called."""
+        return names_of(self.job, self.facets.names)
+
     def views(self, frames: Iterable[int]) -> list[View]:
         """The views of some frames.
 
@@ -90,6 +95,7 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     facets = load_display(load_display_file(job.display))
     raise_all(JobError, facet_problems(job, facets.count))
     layout = layout_for(job.layout or PackSpec(), facets, kept)
+    raise_all(JobError, names_problems(job, len(layout.pages), facets.count))
     demand_memory(job, layout)
     scene, source = load_moving_scene(scene_spec(job), float(job.fps))
     demand_shadows(scene)
