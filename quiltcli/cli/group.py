@@ -19,6 +19,8 @@ COMMANDS = (
     "contact",
     "diff",
     "export",
+    "farm",
+    "film",
     "import",
     "info",
     "new",

@@ -8,7 +8,15 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeAlias
 
-from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    Tag,
+    WithJsonSchema,
+)
 
 from quiltcli.channels import CHANNELS
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
@@ -71,6 +79,21 @@ def _rate(value: Any) -> Fraction:
     return rate
 
 
+def _scale(value: Any) -> Fraction:
+    if isinstance(value, Fraction):
+        return value
+    wrong = complaint(f"expected a share such as 1/4 or 0.5, got {describe(value)}")
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise wrong
+    try:
+        scale = Fraction(value if not isinstance(value, str) or _FRACTION.fullmatch(value) else "none")
+    except (ValueError, ZeroDivisionError, OverflowError):
+        raise wrong from None
+    if not 0 < scale <= 1:
+        raise complaint(f"must be above 0 and at most 1, got {describe(value)}")
+    return scale.limit_denominator(1000)
+
+
 def _layout(value: Any) -> Any:
     if isinstance(value, (str, Path, dict, Model)):
         return value
@@ -128,6 +151,14 @@ class RenderSpec(Model):
     """Draw the shadows of lights that have them."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
+
+    scale: Annotated[
+        Fraction,
+        PlainValidator(_scale),
+        PlainSerializer(float, return_type=float),
+        WithJsonSchema({"type": ["number", "string"], "examples": [0.5, "1/4"]}),
+    ] = Fraction(1)
+    """Share of the display's pixels across and down, for proxies: 1/4; its layout is packed anew."""
 
     @property
     def averages(self) -> bool:
