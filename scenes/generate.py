@@ -176,7 +176,15 @@ def pavilion() -> Mesh:
     mesh = Mesh()
     paint(mesh, "chalk")
     turn(mesh, [(0, -0.05), (0.49, -0.05), (0.5, -0.04), (0.5, 0)], 64)
-    column = [(0.045, 0), (0.045, 0.02), (0.03, 0.03), (0.024, 0.44), (0.024, 0.46), (0.042, 0.47), (0.042, 0.49)]
+    column = [
+        (0.045, 0),
+        (0.045, 0.02),
+        (0.03, 0.03),
+        (0.024, 0.44),
+        (0.024, 0.46),
+        (0.042, 0.47),
+        (0.042, 0.49),
+    ]
     for k in range(8):
         angle = 2 * math.pi * (k + 0.5) / 8
         turn(mesh, [(0, 0), *column, (0, 0.49)], 20, (0.43 * math.cos(angle), 0.43 * math.sin(angle)))
@@ -185,7 +193,9 @@ def pavilion() -> Mesh:
     return mesh
 
 
-def turn(mesh: Mesh, profile: list[tuple[float, float]], sides: int, at: tuple[float, float] = (0, 0)) -> None:
+def turn(
+    mesh: Mesh, profile: list[tuple[float, float]], sides: int, at: tuple[float, float] = (0, 0)
+) -> None:
     """Add what a profile makes around an upright axis at a place."""
     part = revolved(profile, sides)
     first = mesh.add_points([(x + at[0], y, z + at[1]) for x, y, z in part.vertices])

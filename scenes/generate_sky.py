@@ -17,7 +17,15 @@ from PIL import Image
 HERE = Path(__file__).parent
 SUN = np.array([0.80, 0.40, 0.42])
 STONES = np.array(
-    [(232, 222, 200), (206, 190, 160), (150, 62, 44), (40, 66, 92), (90, 122, 112), (196, 150, 70), (70, 58, 50)],
+    [
+        (232, 222, 200),
+        (206, 190, 160),
+        (150, 62, 44),
+        (40, 66, 92),
+        (90, 122, 112),
+        (196, 150, 70),
+        (70, 58, 50),
+    ],
     dtype=np.uint8,
 )
 
@@ -31,7 +39,11 @@ def sky() -> np.ndarray:
     x, z = np.sin(down)[:, None] * np.sin(across), -np.sin(down)[:, None] * np.cos(across)
     towards = (np.stack((x, y, z), axis=-1) @ (SUN / np.linalg.norm(SUN)))[..., None]
     rise = np.clip(y, 0, 1)[..., None]
-    zenith, horizon, warm = np.array([0.10, 0.20, 0.48]), np.array([0.50, 0.52, 0.62]), np.array([1.0, 0.52, 0.24])
+    zenith, horizon, warm = (
+        np.array([0.10, 0.20, 0.48]),
+        np.array([0.50, 0.52, 0.62]),
+        np.array([1.0, 0.52, 0.24]),
+    )
     above = zenith + (horizon - zenith) * (1 - rise) ** 3
     near = np.clip(towards * 0.5 + 0.5, 0, 1)
     above = above + warm * (1.2 * near**4 * (1 - rise) ** 2)

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from quiltcli.analysis.delivery import delivery_problems
 from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
 from quiltcli.display.notices import display_notices
@@ -19,7 +20,7 @@ from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
 from quiltcli.formats.mesh.read import SUFFIXES
 from quiltcli.formats.yaml.source import parse_yaml
-from quiltcli.images.names import layout_path
+from quiltcli.images.names import layout_path, names_problems
 from quiltcli.job import (
     JobFile,
     PackSpec,
@@ -35,7 +36,7 @@ from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
-from quiltcli.render.setup import texture_limits
+from quiltcli.render.setup import facets_and_layout, texture_limits
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.textures.pool import check_textures
@@ -45,14 +46,17 @@ from quiltcli.viewer.view import facet_problems, view_problems
 T = TypeVar("T")
 
 
-def check_files(paths: Iterable[Path], say: Callable[[str], None] = lambda notice: None) -> list[Problem]:
+def check_files(
+    paths: Iterable[Path], say: Callable[[str], None] = lambda notice: None, target: str = ""
+) -> list[Problem]:
     """Every problem of jobs, displays, layouts, scenes and meshes, each once, file by file.
 
     Args:
         paths: the files.
         say: told once each what is no problem but good to know: what of a scene is not drawn.
+        target: who will play a job's images, a name of `delivery.TARGETS`; empty for nobody known.
     """
-    findings = _Findings()
+    findings = _Findings(target)
     for path in paths:
         findings.check(Path(path))
     for notice in dict.fromkeys(findings.notices):
@@ -63,7 +67,8 @@ def check_files(paths: Iterable[Path], say: Callable[[str], None] = lambda notic
 class _Findings:
     """The problems and notices found so far, and the displays that were built on the way."""
 
-    def __init__(self) -> None:
+    def __init__(self, target: str = "") -> None:
+        self.target = target
         self.problems: list[Problem] = []
         self.notices: list[str] = []
         self.displays: dict[Path, Facets | None] = {}
@@ -164,9 +169,14 @@ def _check_job(findings: _Findings, path: Path) -> None:
     findings.problems += found
     facets = findings.facets(job.display)
     choice = job.layout or (load_display_file(job.display).layout if facets else None) or PackSpec()
+    if facets is not None and job.render.scale != 1:
+        facets, choice = facets_and_layout(job)
     placed = findings.run(layout_for, choice, facets, layout_path(job.output.directory))
     if placed is not None:
         findings.run(demand_memory, job, placed)
+        findings.problems += names_problems(job, len(placed.pages), placed.facet.size)
+        if findings.target and facets is not None:
+            findings.problems += delivery_problems(job, facets.names, placed, findings.target)
         if facets is not None and not found:
             findings.notices += job_warnings(job, facets, placed)
     if facets is None and isinstance(choice, Path):

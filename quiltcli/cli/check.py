@@ -12,16 +12,26 @@ from quiltcli.cli.options import PATH
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=PATH)
-def check(files: tuple[Path, ...]) -> None:
+@click.option("--strict", is_flag=True, help="Fail on what is only worth a second look, too.")
+@click.option(
+    "--for",
+    "target",
+    type=click.Choice(("disguise", "7thsense", "resolume", "hap")),
+    help="Hold a job's names and sizes against what those who play the images ask.",
+)
+def check(files: tuple[Path, ...], strict: bool, target: str | None) -> None:
     """Read FILES strictly and report every problem found; what is only worth a second look goes to stderr."""
     from quiltcli.analysis.check import check_files
 
     notices: list[str] = []
-    problems = check_files(files, notices.append)
+    problems = check_files(files, notices.append, target or "")
     for problem in problems:
         click.echo(str(problem))
     if problems:
         sys.exit(1)
     for notice in notices:
         click.echo(f"note: {notice}", err=True)
+    if strict and notices:
+        click.echo(f"{len(notices)} note{'s' * (len(notices) > 1)}, which --strict does not allow", err=True)
+        sys.exit(1)
     click.echo(f"{len(files)} file{'s' * (len(files) > 1)}: nothing is wrong", err=True)

@@ -12,12 +12,15 @@ from quiltcli.ending import end_by_error, ended
 from quiltcli.errors import QuiltError
 
 COMMANDS = (
+    "assemble",
     "cameras",
     "check",
     "compare",
     "contact",
     "diff",
     "export",
+    "farm",
+    "film",
     "import",
     "info",
     "new",
@@ -25,6 +28,7 @@ COMMANDS = (
     "path",
     "pattern",
     "preview",
+    "project",
     "render",
     "schema",
     "simulate",

@@ -46,6 +46,18 @@ class Words(click.ParamType):  # type: ignore[type-arg] # generic only in some v
         return [CompletionItem(word) for word in self.known() if word.startswith(incomplete)]
 
 
+class FarmFrames(Parsed):
+    """Frames, in whose text a colon is a step for farms that mean that by it (`--progress openjd`)."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """As `Parsed`; the option that says who asks has been read before."""
+        if isinstance(value, str) and ctx is not None and ctx.params.get("progress") == "openjd":
+            from quiltcli.job.frames import parse_frames
+
+            return Parsed(self.name, lambda text: parse_frames(text, colon=True)).convert(value, param, ctx)
+        return super().convert(value, param, ctx)
+
+
 def _frames(text: str) -> tuple[int, ...]:
     from quiltcli.job.frames import parse_frames
 
@@ -131,7 +143,7 @@ def _job_keys() -> Iterable[str]:
     return (f"{path}=" for path, _ in keys("quilt_job") if "[]" not in path)
 
 
-FRAMES = Parsed("frames", _frames)
+FRAMES = FarmFrames("frames", _frames)
 FACETS = Parsed("facets", _facets)
 SIZE = Parsed("size", _size)
 ASPECT = Parsed("aspect", _aspect)
@@ -153,6 +165,13 @@ SETS = click.option(
     help="Set a value of the job, by dotted path.",
 )
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace images that exist.")
+COLORSPACE = click.option(
+    "--colorspace",
+    type=click.Choice(("auto", "srgb", "linear")),
+    default="auto",
+    show_default=True,
+    help="What numbers of pictures mean; auto takes whole numbers for sRGB, floats for light.",
+)
 EXPOSURE = click.option("--exposure", type=float, default=0.0, show_default=True, help="Stops brighter.")
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
     from quiltcli.render.report import FrameRecord
+    from quiltcli.render.sequence import Listener
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,51 @@ class Progress:
     begin: Callable[[int], None]
     frame_done: Callable[[FrameRecord], None]
     say: Callable[[str], None]
+
+
+def watched(work: Callable[[Listener], list[FrameRecord]], form: str = "auto") -> list[FrameRecord]:
+    """Do what makes frames, with its progress on stderr; a signal that stops it ends the program.
+
+    What many frames have warned of is said once they are done.
+
+    Args:
+        work: does it, and tells a listener.
+        form: `auto`, or `openjd` for the lines that Open Job Description reads on stdout.
+    """
+    from quiltcli.render.interrupt import Stopped
+    from quiltcli.render.report import summary_warnings
+    from quiltcli.render.sequence import Listener
+
+    with progress() as plain:
+        shown = _with_farm_lines(plain) if form == "openjd" else plain
+        try:
+            records = work(Listener(shown.begin, shown.frame_done, shown.say))
+        except Stopped as stopped:
+            shown.say(str(stopped))
+            sys.exit(stopped.exit_code)
+    for warning in summary_warnings(records):
+        sys.stderr.write(f"warning: {warning}\n")
+    return records
+
+
+def _with_farm_lines(shown: Progress) -> Progress:
+    """The same, and a share and a status on stdout after every frame."""
+    frames = done = 0
+
+    def begin(count: int) -> None:
+        nonlocal frames
+        frames = count
+        shown.begin(count)
+
+    def frame_done(record: FrameRecord) -> None:
+        nonlocal done
+        done += 1
+        shown.frame_done(record)
+        sys.stdout.write(f"openjd_progress: {100 * done / max(frames, 1):.1f}\n")
+        sys.stdout.write(f"openjd_status: frame {_named(record)}, {done} of {frames}\n")
+        sys.stdout.flush()
+
+    return Progress(begin, frame_done, shown.say)
 
 
 @contextlib.contextmanager

@@ -26,7 +26,17 @@ from quiltcli.cli.printing import print_aligned
     help="Hand the frames to a dask scheduler; it and its workers need the same quilt, and workers the same"
     " files at the same paths.",
 )
+@click.option(
+    "--progress",
+    type=click.Choice(("auto", "openjd")),
+    default="auto",
+    is_eager=True,
+    help="openjd: lines for farms of Open Job Description, whose frames may have a step 1-9:2.",
+)
 @click.option("--dry-run", is_flag=True, help="Find every problem, write nothing.")
+@click.option("--scale", metavar="SHARE", help="Draw fewer pixels, 1/4 across and down, for a proxy.")
+@click.option("--max-memory", "memory", metavar="SIZE", help="Take at most so much, such as 8GB, or refuse.")
+@click.option("--strict", is_flag=True, help="Refuse what would only be worth a second look.")
 @click.option("--profile", is_flag=True, help="Say where the time went, by stage.")
 @SETS
 def render(
@@ -38,7 +48,11 @@ def render(
     facets: tuple[int, ...] | None,
     threads: int | None,
     scheduler: str | None,
+    progress: str,
     dry_run: bool,
+    scale: str | None,
+    memory: str | None,
+    strict: bool,
     profile: bool,
     sets: tuple[str, ...],
 ) -> None:
@@ -48,32 +62,30 @@ def render(
 
     if resume and overwrite:
         raise click.UsageError("--resume keeps finished frames and --overwrite replaces them: give one")
-    options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run)
-    records = _render(load_job(job, sets), options, scheduler)
+    if memory is not None:
+        from quiltcli.formats.capacity import limit_memory, read_bytes
+
+        limit_memory(read_bytes(memory))
+    if scale is not None:
+        sets = (*sets, f"render.scale={scale}")
+    options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run, strict)
+    records = _render(load_job(job, sets), options, scheduler, progress)
     if profile and records:
         _print_profile(records)
 
 
-def _render(job: Any, options: Any, scheduler: str | None) -> Any:
+def _render(job: Any, options: Any, scheduler: str | None, form: str) -> Any:
     """Render here or on a farm, with progress on stderr and the summary on stdout."""
-    from quiltcli.cli.progress import progress
+    from quiltcli.cli.progress import watched
     from quiltcli.render.farm import render_on
-    from quiltcli.render.interrupt import Stopped
-    from quiltcli.render.report import summary_warnings
-    from quiltcli.render.sequence import Listener
     from quiltcli.render.sequence import render as render_here
 
-    def work(*given: Any) -> Any:
-        return render_here(*given) if scheduler is None else render_on(scheduler, *given)
+    def work(listener: Any) -> Any:
+        if scheduler is None:
+            return render_here(job, options, listener)
+        return render_on(scheduler, job, options, listener)
 
-    with progress() as shown:
-        try:
-            records = work(job, options, Listener(shown.begin, shown.frame_done, shown.say))
-        except Stopped as stopped:
-            shown.say(str(stopped))
-            sys.exit(stopped.exit_code)
-    for warning in summary_warnings(records):
-        click.echo(f"warning: {warning}", err=True)
+    records = watched(work, form)
     if options.dry_run:
         click.echo("nothing is wrong with this job")
     elif records:

@@ -12,6 +12,7 @@ from quiltcli.display.facets import (
     lit_facets,
     pitch_mm,
     pitch_of,
+    scaled,
     shared_edges,
     triangulate,
 )
@@ -27,6 +28,7 @@ __all__ = [
     "load_display",
     "pitch_mm",
     "pitch_of",
+    "scaled",
     "shared_edges",
     "triangulate",
 ]

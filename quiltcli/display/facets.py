@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -137,6 +138,17 @@ class Facets:
             # Adding zero turns −0 into 0.
             digest.update(np.ascontiguousarray(np.round(exact, 9) + 0.0, dtype="<f8").tobytes())
         return digest.hexdigest()
+
+
+def scaled(facets: Facets, scale: Fraction) -> Facets:
+    """The same facets with fewer pixels: rasters grow to whole pixels at the right and below.
+
+    Places on a canvas, which are for whole images, are dropped.
+    """
+    top, bottom = scale.numerator, scale.denominator
+    size = -(-facets.size.astype(np.int64) * top // bottom)
+    du, dv = facets.du * (bottom / top), facets.dv * (bottom / top)
+    return replace(facets, size=np.maximum(size, 1).astype(np.int32), du=du, dv=dv, places=None)
 
 
 def lit_facets(facets: Facets, eye: FloatArray) -> BoolArray:

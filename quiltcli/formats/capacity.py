@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+
+from quiltcli.errors import JobError
 
 # Left to the system, the interpreter and what is not worth counting.
 _RESERVE = 256 << 20
@@ -13,14 +16,44 @@ _PROC = Path("/proc")
 _GROUP = Path("/sys/fs/cgroup")
 
 
+_SIZE = re.compile(r"(\d{1,12}(?:\.\d{1,6})?)\s*([KMGT]?)(i?)B?", re.IGNORECASE)
+_limit: int | None = None
+
+
+def read_bytes(text: str) -> int:
+    """Bytes of a size such as `8GB`, `512 MiB` or a plain number.
+
+    Raises:
+        JobError: it is no size.
+    """
+    match = _SIZE.fullmatch(text.strip())
+    if match is None:
+        raise JobError(f"expected a size such as 8GB or 512MiB, got {text!r}")
+    power = " KMGT".index(match[2].upper() or " ")
+    return int(float(match[1]) * (1024 if match[3] else 1000) ** power)
+
+
+def limit_memory(most: int | None) -> None:
+    """Let this process and those that it starts take at most so many bytes; None for all there are."""
+    global _limit  # noqa: PLW0603 # of the process, as what it measures
+    _limit = most
+
+
 def free_memory() -> int | None:
     """Bytes that this process may still take, None where nothing tells.
 
-    The least of what the system has available, what the control group leaves and what the limit of
-    the address space leaves (`ulimit -v`).
+    The least of what the system has available, what the control group leaves, what the limit of the
+    address space leaves (`ulimit -v`) and what `limit_memory` does.
     """
-    known = [limit for limit in (_system(), _control_group(), _address_space()) if limit is not None]
+    told = (_system(), _control_group(), _address_space(), _allowed())
+    known = [limit for limit in told if limit is not None]
     return max(min(known) - _RESERVE, 0) if known else None
+
+
+def _allowed() -> int | None:
+    """What the user allows, but for what is taken already."""
+    used = dict(_fields(_PROC / "self" / "status")).get("VmRSS", 0)
+    return None if _limit is None else _limit - used
 
 
 def free_disk(path: Path) -> int | None:

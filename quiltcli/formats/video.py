@@ -35,6 +35,8 @@ class Coding:
         source: layout of the pictures it is given: 8 or 16 bits a channel.
         options: of the encoder.
         container_options: of the file.
+        tag: four letters by which players know the codec, where the file's own are not the best.
+        least: width and height that the encoder takes at least.
     """
 
     container: str
@@ -43,6 +45,8 @@ class Coding:
     source: str
     options: dict[str, str]
     container_options: dict[str, str]
+    tag: str = ""
+    least: tuple[int, int] = (2, 2)
 
     @property
     def depth(self) -> int:
@@ -58,6 +62,31 @@ CODINGS = {
 }
 """By the ending of the film's name; ProRes is 422 HQ, 10 bits. What H.264 makes of a picture depends on
 the number of threads: one is fast enough for pictures that have to be drawn."""
+
+
+CODECS = {
+    "h264": CODINGS[".mp4"],
+    "prores": CODINGS[".mov"],
+    "h265": Coding(
+        "mp4",
+        "libx265",
+        "yuv420p10le",
+        "rgb48le",
+        {"crf": "20", "x265-params": "pools=1:frame-threads=1:log-level=error"},
+        {"movflags": "+faststart"},
+        "hvc1",  # without it Apple's players show nothing
+    ),
+    "dnxhr": Coding(
+        "mov",
+        "dnxhd",
+        "yuv422p10le",
+        "rgb48le",
+        {"profile": "dnxhr_hqx", "threads": "1"},
+        {},
+        least=(256, 120),
+    ),
+}
+"""By name; DNxHR is HQX, 10 bits."""
 
 
 def coding_of(path: Path) -> Coding:
@@ -87,7 +116,7 @@ Frame = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 @contextmanager
-def film(path: Path, fps: Fraction) -> Iterator[Callable[[Frame], None]]:
+def film(path: Path, fps: Fraction, coding: Coding | None = None) -> Iterator[Callable[[Frame], None]]:
     """Write a film, whole or not at all; yields what takes its pictures one after another.
 
     A picture is (H, W, 3) display values, uint8 or uint16 as `Coding.depth` has it, all of one size.
@@ -95,12 +124,13 @@ def film(path: Path, fps: Fraction) -> Iterator[Callable[[Frame], None]]:
     Args:
         path: the film; the folder is made.
         fps: pictures a second.
+        coding: of the film; what its name asks for by default.
 
     Raises:
         OutputError: the film cannot be written, or its name says of no coding; nothing is left behind.
         MissingExtraError: PyAV is not installed.
     """
-    coding, av = coding_of(path), _av()
+    coding, av = coding or coding_of(path), _av()
     make_folder(path.parent)
     with whole_file(path) as temporary:
         try:
@@ -108,7 +138,15 @@ def film(path: Path, fps: Fraction) -> Iterator[Callable[[Frame], None]]:
                 str(temporary), "w", format=coding.container, container_options=dict(coding.container_options)
             ) as container:
                 stream = container.add_stream(coding.codec, rate=fps, options=dict(coding.options))
-                yield lambda picture: container.mux(_encoded(av, stream, coding, picture))
+
+                def show(picture: Frame) -> None:
+                    if picture.shape[1] < coding.least[0] or picture.shape[0] < coding.least[1]:
+                        width, height = coding.least
+                        words = f"{coding.codec} takes pictures of {width}×{height} pixels or more"
+                        raise OutputError(Problem(words, file=str(path)))
+                    container.mux(_encoded(av, stream, coding, picture))
+
+                yield show
                 container.mux(stream.encode())
         except av.error.FFmpegError as error:
             words = f"cannot be written: {error.strerror or error}"
@@ -122,6 +160,8 @@ def _encoded(av: Any, stream: Any, coding: Coding, picture: Frame) -> Any:
     if not codec.is_open:
         stream.height, stream.width = even.shape[:2]
         stream.pix_fmt = coding.pixels
+        if coding.tag:
+            codec.codec_tag = coding.tag
         codec.color_primaries = codec.color_trc = codec.colorspace = BT709
         codec.color_range = LIMITED
     frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(even), format=coding.source)

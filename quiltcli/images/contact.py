@@ -6,7 +6,7 @@ Thumbnails are means of whole pixels, labels are drawn dot by dot: a sheet is th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.drawing.font import HEIGHT, text_mask, text_width
-from quiltcli.images.names import ImageName, name_of
+from quiltcli.images.names import names_in
 from quiltcli.images.preview import Bytes, Look, display_values, image_colors, scaled_down, write_values
 from quiltcli.job.frames import format_frames
 
@@ -62,7 +62,9 @@ def contact_sheet(out: Path, picture: Path, sheet: Sheet | None = None) -> tuple
 
 def chosen_images(out: Path, sheet: Sheet) -> list[tuple[str, Path]]:
     """Label and file of every image on the sheet, by frame, then by page or facet (OutputError)."""
-    known = sorted(_images(out), key=lambda item: (item[0].kind, item[0].frame, item[0].number, item[0].eye))
+    known = sorted(
+        names_in(out).found(out), key=lambda item: (item[0].kind, item[0].frame, item[0].number, item[0].eye)
+    )
     kind = sheet.kind or ("page" if any(name.kind == "page" for name, _ in known) else "facet")
     known = [(name, path) for name, path in known if name.kind == kind]
     if not known:
@@ -83,13 +85,6 @@ def chosen_images(out: Path, sheet: Sheet) -> list[tuple[str, Path]]:
             Problem(f"has {len(found)} such images, more than {MOST} (choose frames)", str(out))
         )
     return found
-
-
-def _images(out: Path) -> Iterator[tuple[ImageName, Path]]:
-    """Every image of a folder, with what its name says."""
-    for path in (*out.glob("quilt/page_*.exr"), *out.glob("facets/facet_*.exr")):
-        if found := name_of(path):
-            yield found, path
 
 
 def _thumbnail(path: Path, sheet: Sheet) -> Bytes:

@@ -171,6 +171,56 @@ def quilt_buffers(
     return quilt
 
 
+def lay_facet(
+    quilt: Mapping[str, Channel],
+    image: Mapping[str, Channel],
+    layout: Layout,
+    row: int,
+    owners: NDArray[np.integer[Any]],
+    bleed: int,
+) -> None:
+    """Put the image of one facet into a quilt, and repeat its edge in the facet's bleed.
+
+    Args:
+        quilt: name → flat buffer over all pages, written to.
+        image: name → (H, W) channel.
+        layout: where the facets are.
+        row: the facet's row in the layout.
+        owners: flat: the facet's id inside its polygon, minus the id in its bleed.
+        bleed: how far from the polygon that may be, pixels.
+    """
+    page, facet = int(layout.page[row]), layout.facet[row]
+    if page < 0:
+        return
+    pages = {name: page_of(quilt[name], layout, page) for name in image}
+    x0, y0, x1, y1 = surroundings(layout, row, bleed + 1)
+    left = np.abs(page_of(owners, layout, page)[y0:y1, x0:x1]) == facet
+    if window := _window(layout, row):
+        mine = np.abs(window.view(page_of(owners, layout, page))) == facet
+        for name, channel in image.items():
+            np.copyto(window.view(pages[name]), channel, where=mine)
+        (low_x, low_y), (high_x, high_y) = window.low, window.high
+        left[low_y - y0 : high_y - y0, low_x - x0 : high_x - x0] = False
+    y, x = np.nonzero(left)
+    back = np.linalg.inv(np.vstack((layout.quilt_from_facet[row], [0, 0, 1])))[:2]
+    i, j = _mapped(back, x + x0, y + y0)
+    width, height = layout.size[row].tolist()
+    i, j = np.clip(i, 0, width - 1), np.clip(j, 0, height - 1)
+    for name, channel in image.items():
+        pages[name][y + y0, x + x0] = channel[j, i]
+
+
+def surroundings(layout: Layout, row: int, reach: int) -> tuple[int, int, int, int]:
+    """Bounds x0, y0, x1, y1 on the page of a facet's raster and what lies within reach of it."""
+    width, height = layout.size[row].tolist()
+    corners = np.array([[0, width, 0, width], [0, 0, height, height], [1, 1, 1, 1]])
+    at = layout.quilt_from_facet[row] @ corners
+    page = layout.pages[layout.page[row]]
+    low = np.clip(np.floor(at.min(axis=1)).astype(np.int64) - reach, 0, page)
+    high = np.clip(np.ceil(at.max(axis=1)).astype(np.int64) + reach, low, page)
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+
 def _put_facet(
     quilt: Mapping[str, Channel],
     image: Mapping[str, Channel],

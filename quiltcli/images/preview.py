@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.formats.exr.image import read_parts
 from quiltcli.formats.png import save_png
-from quiltcli.formats.whole import make_folder, whole_file
+from quiltcli.formats.stills import write_still
+from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import Float32Array
 from quiltcli.images.layers import joined
 from quiltcli.images.window import whole_frame
@@ -154,20 +155,8 @@ def write_values(path: Path, pixels: Values, view: str) -> None:
     if kind == "png" and pixels.dtype == np.uint8:
         write_bytes(path, pixels.astype(np.uint8, copy=False))
         return
-    import OpenImageIO
-
-    height, width, _ = pixels.shape
-    spec = OpenImageIO.ImageSpec(width, height, 3, str(pixels.dtype))
-    spec.attribute("oiio:ColorSpace", "lin_rec709_scene" if view == "raw" else "srgb_rec709_scene")
-    spec.attribute("compression", "zip")
-    spec.attribute("DateTime", "    :  :     :  :  ")  # unknown: the library would write today's
-    with whole_file(path) as temporary:
-        temporary.touch()  # so that what the system has against it is told in its own words
-        file: Any = OpenImageIO.ImageOutput.create(kind)
-        good = file.open(str(temporary), spec) and file.write_image(np.ascontiguousarray(pixels))
-        if not (file.close() and good):
-            said = " ".join(file.geterror().split()) or "the file is not whole"
-            raise OutputError(Problem(f"cannot be written: {said}", file=str(path)))
+    colorspace = "lin_rec709_scene" if view == "raw" else "srgb_rec709_scene"
+    write_still(path, pixels, 8 if pixels.dtype == np.uint8 else 16, colorspace)
 
 
 def block_means(image: NDArray[Any], factor: int) -> Float32Array:

@@ -41,6 +41,10 @@ def job_sha256(job: JobFile) -> str:
         data["layout"] = _layout_sha256(job.layout)
     elif isinstance(job.layout, PackSpec):
         data["layout"] = wishes_sha256(job.layout)
+    if job.render.scale == 1:
+        del data["render"]["scale"]  # what there was before there was this key
+    else:
+        data["layout"] = "packed anew"
     del data["frames"], data["render"]["texture_memory"]
     data["output"] = {key: data["output"][key] for key in ("channels", "compression", "data_window")}
     return _text_sha256(data)

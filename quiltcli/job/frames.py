@@ -13,17 +13,22 @@ from quiltcli.errors import JobError
 
 LIMIT = 1_000_000
 _PART = re.compile(r"(-?\d{1,9})(?:-(-?\d{1,9}))?(?:x(\d{1,9}))?")
+_COLON = re.compile(r"(?<=\d)\s*:\s*(?=\d)")
 _FRAMES = "expected a frame range such as 1-240, 1-9x2 or 1,5,20-30"
 _FACETS = "expected facet ids such as 3,7-9"
 
 
-def parse_frames(text: str) -> tuple[int, ...]:
+def parse_frames(text: str, *, colon: bool = False) -> tuple[int, ...]:
     """Frame numbers of a range, ascending.
+
+    Args:
+        text: the range.
+        colon: whether a colon is a step too, as in Open Job Description: 1-9:2.
 
     Raises:
         JobError: the text is no range, goes backwards, or names a frame twice.
     """
-    return _parse(text, "frame", _FRAMES)
+    return _parse(_COLON.sub("x", text) if colon else text, "frame", _FRAMES)
 
 
 def parse_facets(text: str) -> tuple[int, ...]:

@@ -8,7 +8,15 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeAlias
 
-from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    Tag,
+    WithJsonSchema,
+)
 
 from quiltcli.channels import CHANNELS
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
@@ -31,6 +39,7 @@ from quiltcli.job.model import (
     either,
     exactly_one,
 )
+from quiltcli.job.names import NamesSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
 METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
@@ -71,6 +80,21 @@ def _rate(value: Any) -> Fraction:
     if not Fraction(1, 1000) <= rate <= 1_000_000 or rate.denominator > _LONGEST:
         raise complaint(f"must be from 0.001 to 1000000 frames a second, got {describe(value)}")
     return rate
+
+
+def _scale(value: Any) -> Fraction:
+    if isinstance(value, Fraction):
+        return value
+    wrong = complaint(f"expected a share such as 1/4 or 0.5, got {describe(value)}")
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise wrong
+    try:
+        scale = Fraction(value if not isinstance(value, str) or _FRACTION.fullmatch(value) else "none")
+    except (ValueError, ZeroDivisionError, OverflowError):
+        raise wrong from None
+    if not 0 < scale <= 1:
+        raise complaint(f"must be above 0 and at most 1, got {describe(value)}")
+    return scale.limit_denominator(1000)
 
 
 def _layout(value: Any) -> Any:
@@ -148,6 +172,14 @@ class RenderSpec(Model):
     texture_memory: Annotated[float, Field(gt=0, le=1_000_000)] = 4096.0
     """Memory that all textures may take together, megabytes."""
 
+    scale: Annotated[
+        Fraction,
+        PlainValidator(_scale),
+        PlainSerializer(float, return_type=float),
+        WithJsonSchema({"type": ["number", "string"], "examples": [0.5, "1/4"]}),
+    ] = Fraction(1)
+    """Share of the display's pixels across and down, for proxies: 1/4; its layout is packed anew."""
+
     @property
     def averages(self) -> bool:
         """Whether light is the mean of samples, and not that of the pixel's centre at the frame's time."""
@@ -194,6 +226,8 @@ class OutputSpec(Model):
     """Images of facets that face away from the viewer: written, hard links to one of their size, or none."""
     data_window: Annotated[str, OneOf(DATA_WINDOWS)] = "full"
     """Pixels in a file: all of the page or facet, or no margins that show nothing (tight)."""
+    names: NamesSpec = NamesSpec()
+    """Names of the images."""
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Something is written, and nothing twice."""
@@ -257,6 +291,9 @@ class JobFile(FileModel):
         if self.viewer is not None and self.viewer.facets is not None:
             yield ("viewer", "facets"), "belongs to one of several viewers (expected viewers: {NAME: …})"
         yield from _shared_facets(self.viewers or {})
+        if (self.viewer or self.viewers) and self.is_stereo and self.output.stereo == "files":
+            written = (("page", self.output.quilts), ("facet", self.output.facets))
+            yield from self.output.names.lacking_eyes([kind for kind, wanted in written if wanted])
         if self.render.clip == "distance" and "zv" in self.output.channels:
             words = "zv lies between a near and a far plane (expected planar or auto), got distance"
             yield ("render", "clip"), words

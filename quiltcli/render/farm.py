@@ -26,11 +26,10 @@ from quiltcli.job import JobFile
 from quiltcli.render.farm_task import Inputs, Task, inputs_fault, render_task
 from quiltcli.render.farm_watch import Watch
 from quiltcli.render.interrupt import stop_between_frames
-from quiltcli.render.notices import stage_warnings
 from quiltcli.render.outputs import write_settings
 from quiltcli.render.report import FrameRecord, write_report
 from quiltcli.render.resume import clear_away
-from quiltcli.render.sequence import Listener, Prepared, RenderOptions, failing_run, prepare
+from quiltcli.render.sequence import Listener, Prepared, RenderOptions, failing_run, prepare, say_notices
 from quiltcli.viewer.view import by_file
 
 _RETRIES = 2
@@ -66,12 +65,11 @@ def render_on(
     folder = (options.folder or job.output.directory).absolute()
     options = replace(options, folder=folder)
     ready = prepare(job, options)
-    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage, options.frames)):
-        listener.say(notice)
+    say_notices(ready, options, listener)
     listener.begin(len(ready.views))
     if options.dry_run:
         return []
-    clear_away(ready.stage, ready.out, ready.views)
+    clear_away(ready.stage, ready.out)
     if not ready.views:
         return []
     with _connected(distributed, address) as client, stop_between_frames("") as request:
@@ -82,7 +80,7 @@ def render_on(
         groups = by_file(ready.views)
         tasks = [Task(folder / "job.yaml", ready.out.job_sha, views, options) for views in groups]
         records = _collect(client, watch, tasks, listener)
-    clear_away(ready.stage, ready.out, ready.views)  # what workers that died have left
+    clear_away(ready.stage, ready.out)  # what workers that died have left
     return records
 
 

@@ -10,8 +10,12 @@ from quiltcli.channels import exr_channels
 from quiltcli.errors import JobError
 from quiltcli.formats.capacity import bytes_text, free_disk, free_memory
 from quiltcli.job import JobFile
+from quiltcli.job.names import Slot, read_template
 from quiltcli.layout import Layout
 from quiltcli.layout.owners import owner_bytes
+
+MOST_SIDE = 16384
+MOST_PIXELS = 10**9
 
 
 def demand_memory(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> None:
@@ -47,6 +51,35 @@ def pixel_bytes(job: JobFile) -> int:
 def _views(job: JobFile, frames: Sequence[int] | None) -> int:
     """How many views are drawn: one a frame, or one a frame and eye."""
     return len(job.frames if frames is None else frames) * (2 if job.is_stereo else 1)
+
+
+def page_warnings(layout: Layout) -> Iterator[str]:
+    """A sentence for pages that few programs take."""
+    for page, (width, height) in enumerate(layout.pages.tolist(), 1):
+        if max(width, height) > MOST_SIDE or width * height > MOST_PIXELS:
+            yield (
+                f"page {page} is {width}×{height} pixels: many cards and players take {MOST_SIDE} a side at"
+                " most (layout: size and max_pages make smaller ones)"
+            )
+
+
+def number_warnings(job: JobFile, frames: Sequence[int] | None = None) -> Iterator[str]:
+    """A sentence where the frame numbers of a sequence grow a digit, which ends it for many players."""
+    numbers = job.frames if frames is None else frames
+    written = (("page", job.output.quilts), ("facet", job.output.facets))
+    digits = min(
+        slot.digits
+        for kind, wanted in written
+        if wanted
+        for slot in read_template(getattr(job.output.names, kind), kind).parts
+        if isinstance(slot, Slot) and slot.field == "frame"
+    )
+    if max(map(abs, numbers), default=0) >= 10**digits > min(map(abs, numbers), default=0):
+        most = len(str(max(map(abs, numbers))))
+        yield (
+            f"frame numbers in names grow from {digits} digits to {most}, where many players end"
+            f" (output.names with {{frame:0{most}}} keeps them alike)"
+        )
 
 
 def disk_warnings(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> Iterator[str]:

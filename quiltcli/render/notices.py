@@ -10,7 +10,7 @@ from quiltcli.geometry import BoolArray
 from quiltcli.job import JobFile
 from quiltcli.job.frames import format_frames
 from quiltcli.layout import Layout
-from quiltcli.render.needs import disk_warnings
+from quiltcli.render.needs import disk_warnings, number_warnings, page_warnings
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words
 from quiltcli.viewer.edge_on import edge_on_notices
@@ -58,6 +58,8 @@ def job_warnings(
         known = format_frames(job.frames)
         words = f"frame {others[0]} is" if len(others) == 1 else f"frames {format_frames(others)} are"
         yield f"{words} not among the job's frames {known} (the viewer is where its path goes on to)"
+    yield from page_warnings(layout)
+    yield from number_warnings(job, frames)
     yield from disk_warnings(job, layout, frames)
     if not has_embree():
         yield "embreex is not installed: triangles are sorted to facets without it, which takes longer"

@@ -21,14 +21,14 @@ from quiltcli.geometry import BoolArray, IntArray, facet_from_world
 from quiltcli.images.facets import facet_image, page_of
 from quiltcli.images.layers import channel_parts, read_view
 from quiltcli.images.metadata import facet_attributes, page_attributes, viewer_attributes
-from quiltcli.images.names import facet_path, layout_path, quilt_path
+from quiltcli.images.names import layout_path
 from quiltcli.images.window import cropped, frame_size, tight_window, whole_frame
 from quiltcli.job import PackSpec, dump_job
 from quiltcli.layout import Layout, write_layout
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.report import Clock
 from quiltcli.render.setup import Stage
-from quiltcli.viewer.view import View
+from quiltcli.viewer.view import EYES, View
 
 Attributes: TypeAlias = dict[str, object]
 
@@ -41,11 +41,13 @@ class Outputs:
         folder: the output folder.
         job_sha: hash of the job, written into every file.
         rows: facets whose images are written, indices into the layout.
+        besides: attributes that every image has besides those of a render.
     """
 
     folder: Path
     job_sha: str
     rows: IntArray
+    besides: Attributes = field(default_factory=dict)
 
 
 def outputs(stage: Stage, folder: Path, job_sha: str, facet_ids: Iterable[int] | None = None) -> Outputs:
@@ -59,9 +61,30 @@ def outputs(stage: Stage, folder: Path, job_sha: str, facet_ids: Iterable[int] |
 def view_files(stage: Stage, out: Outputs, view: View) -> list[Path]:
     """Every image of one view."""
     job = stage.job.output
-    pages = [quilt_path(out.folder, page + 1, *view.file_key) for page in range(len(stage.layout.pages))]
-    facets = [facet_path(out.folder, int(stage.layout.facet[row]), *view.file_key) for row in out.rows]
+    pages = [page_file(stage, out, page, view) for page in range(len(stage.layout.pages))]
+    facets = [facet_file(stage, out, row, view) for row in out.rows.tolist()]
     return pages * job.quilts + facets * job.facets
+
+
+def page_file(stage: Stage, out: Outputs, page: int, view: View) -> Path:
+    """The file of a page (0-based) of a view."""
+    return stage.names.page(out.folder, page + 1, *view.file_key)
+
+
+def facet_file(stage: Stage, out: Outputs, row: int, view: View) -> Path:
+    """The file of the image of a facet, by its row in the layout."""
+    return stage.names.facet(out.folder, int(stage.layout.facet[row]), *view.file_key)
+
+
+def image_folders(stage: Stage, out: Outputs) -> list[Path]:
+    """The folders that hold images, those of pages first; no folder is for a frame alone."""
+    job, layout = stage.job, stage.layout
+    eyes = EYES if job.is_stereo and job.output.stereo == "files" else ("",)
+    pages = range(1, len(layout.pages) + 1) if job.output.quilts else ()
+    facets = layout.facet[out.rows].tolist() if job.output.facets else []
+    files = [stage.names.page(out.folder, page, 0, eye) for page in pages for eye in eyes]
+    files += [stage.names.facet(out.folder, facet, 0, eye) for facet in facets for eye in eyes]
+    return list(dict.fromkeys(path.parent for path in files))
 
 
 def view_lit(stage: Stage, view: View) -> BoolArray:
@@ -86,9 +109,8 @@ def refuse_to_overwrite(stage: Stage, out: Outputs, views: Iterable[View]) -> No
 
 def write_settings(stage: Stage, out: Outputs) -> None:
     """Make the folders; write the layout used and the job as resolved."""
-    for name, wanted in (("quilt", stage.job.output.quilts), ("facets", stage.job.output.facets)):
-        if wanted:
-            make_folder(out.folder / name)
+    for folder in image_folders(stage, out):
+        make_folder(folder)
     path, job = layout_path(out.folder), stage.job
     if Path(stage.layout.path) != path:  # else it was read from there
         write_layout(stage.layout, path)
@@ -141,8 +163,9 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
     told = (stage.job.fps, out.job_sha, __version__)
     if how.quilts:
         for page in range(len(layout.pages)):
-            path = quilt_path(out.folder, page + 1, *view.file_key)
-            own = [page_attributes(one.view, *told) | {"quilt:page": page + 1} | one.mattes for one in drawn]
+            path = page_file(stage, out, page, view)
+            also = {"quilt:page": page + 1} | out.besides
+            own = [page_attributes(one.view, *told) | also | one.mattes for one in drawn]
             yield _write_page, stage, path, page, drawn, own
     if not how.facets:
         return
@@ -151,17 +174,17 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
     apart = ~lit[out.rows] & (how.unlit != "write")
     for row in out.rows[~apart].tolist():
         facet = int(layout.facet[row])
-        where = facet_attributes(facet, maps[row])
+        where = facet_attributes(facet, maps[row]) | out.besides
         own = [viewer_attributes(one.view, facet, *told) | where | one.mattes for one in drawn]
-        path = facet_path(out.folder, facet, *view.file_key)
+        path = facet_file(stage, out, row, view)
         yield _write_facet, stage, path, row, drawn, own
     if apart.any():
         for rows in _by_size(layout, out.rows[apart]):
-            paths = [facet_path(out.folder, int(layout.facet[row]), *view.file_key) for row in rows]
+            paths = [facet_file(stage, out, row, view) for row in rows]
             if how.unlit == "skip":
                 yield _remove, paths
             else:
-                own = [page_attributes(one.view, *told) | one.mattes for one in drawn]
+                own = [page_attributes(one.view, *told) | out.besides | one.mattes for one in drawn]
                 yield _write_links, stage, rows[0], drawn, own, paths
 
 
@@ -258,7 +281,7 @@ def read_quilt(stage: Stage, out: Outputs, view: View, buffers: Buffers) -> None
     """
     raise_all(OutputError, merge_problems(stage, out, [view]))
     for page in range(len(stage.layout.pages)):
-        path = quilt_path(out.folder, page + 1, *view.file_key)
+        path = page_file(stage, out, page, view)
         image = read_view(path, view.part)
         if missing := sorted(set(buffers) - set(image.channels)):
             raise OutputError(Problem(f"lacks the channels {', '.join(missing)}", str(path)))
@@ -270,7 +293,7 @@ def read_quilt(stage: Stage, out: Outputs, view: View, buffers: Buffers) -> None
 def _pages_on_disk(stage: Stage, out: Outputs, view: View) -> Iterator[tuple[int, Problem | None]]:
     """Every page of the view's quilt, with what is wrong with its file; no pixel is read."""
     for page, (width, height) in enumerate(stage.layout.pages.tolist()):
-        path = quilt_path(out.folder, page + 1, *view.file_key)
+        path = page_file(stage, out, page, view)
         if not path.exists():
             yield (
                 page,

@@ -11,8 +11,7 @@ import numpy as np
 
 from quiltcli.formats.temporary import remove_leftovers
 from quiltcli.images.metadata import is_complete
-from quiltcli.images.names import facet_path
-from quiltcli.render.outputs import Outputs, view_files, view_lit
+from quiltcli.render.outputs import Outputs, facet_file, image_folders, view_files, view_lit
 from quiltcli.render.report import known_views
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.view import View, by_file
@@ -47,13 +46,9 @@ def _skipped_files(stage: Stage, out: Outputs, views: tuple[View, ...]) -> Itera
     if stage.job.output.facets and stage.job.output.unlit == "skip":
         lit = np.logical_or.reduce([view_lit(stage, view) for view in views])
         for row in out.rows[~lit[out.rows]]:
-            yield facet_path(out.folder, int(stage.layout.facet[row]), *views[0].file_key)
+            yield facet_file(stage, out, int(row), views[0])
 
 
-def clear_away(stage: Stage, out: Outputs, views: Iterable[View]) -> None:
-    """Remove what runs that were killed have left of files they were writing, of these views or others."""
-    folders = {out.folder, out.folder / "quilt", out.folder / "facets"}
-    for view in views:
-        folders |= {path.parent for path in view_files(stage, out, view)}
-        break  # all have their files in the same folders
-    remove_leftovers(sorted(folders))
+def clear_away(stage: Stage, out: Outputs) -> None:
+    """Remove what runs that were killed have left of files they were writing."""
+    remove_leftovers(sorted({out.folder, *image_folders(stage, out)}))

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.errors import CheckFailedError, JobError, OutputError, QuiltError, raise_all
+from quiltcli.errors import CheckFailedError, JobError, OutputError, Problem, QuiltError, raise_all
 from quiltcli.formats.exr.image import use_threads
 from quiltcli.formats.noted import noting_inputs
 from quiltcli.geometry import BoolArray
@@ -64,6 +64,7 @@ class RenderOptions:
         facets: ids of the only facets to draw, merged into the quilts that exist.
         threads: batches and files worked on at a time; 0 takes every core.
         dry_run: find every problem, write nothing.
+        strict: take what is only worth a second look for a problem.
     """
 
     frames: Sequence[int] | None = None
@@ -73,6 +74,7 @@ class RenderOptions:
     facets: Sequence[int] | None = None
     threads: int = 0
     dry_run: bool = False
+    strict: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,16 +132,24 @@ def render(
     options, listener = options or RenderOptions(), listener or Listener()
     start = time.perf_counter()
     ready = prepare(job, options)
-    for notice in (*ready.stage.scene.notices, *stage_warnings(ready.stage, options.frames)):
-        listener.say(notice)
+    say_notices(ready, options, listener)
     if options.dry_run:
         return []
-    clear_away(ready.stage, ready.out, ready.views)
+    clear_away(ready.stage, ready.out)
     if not ready.views:
         return []
     with failing_run(of_the_disk=True):
         write_settings(ready.stage, ready.out)
     return render_frames(ready, options.threads or default_threads(), listener, start)
+
+
+def say_notices(ready: Prepared, options: RenderOptions, listener: Listener) -> None:
+    """Tell what is worth a second look; raise it as a JobError where that is wanted."""
+    notices = (*ready.stage.scene.notices, *stage_warnings(ready.stage, options.frames))
+    if options.strict and notices:
+        raise JobError([*map(Problem, notices), Problem("--strict does not allow what is said above")])
+    for notice in notices:
+        listener.say(notice)
 
 
 def prepare(job: JobFile, options: RenderOptions) -> Prepared:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from quiltcli.display import Facets, load_display
+from quiltcli.display import Facets, load_display, scaled
 from quiltcli.errors import JobError, SceneError, raise_all
 from quiltcli.geometry import OwnerArray
-from quiltcli.images.names import layout_path
-from quiltcli.job import JobFile, PackSpec, SceneFile, load_display_file, load_scene_file
+from quiltcli.images.names import Names, layout_path, names_of, names_problems
+from quiltcli.job import JobFile, PackSpec, SceneFile, UvLayoutSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
@@ -59,6 +59,11 @@ class Stage:
         """What near and far cut in all frames, `planar` or `distance`."""
         return settled_clip(self.job, self.facets)
 
+    @cached_property
+    def names(self) -> Names:
+        """How the images are called."""
+        return names_of(self.job, self.facets.names)
+
     def views(self, frames: Iterable[int]) -> list[View]:
         """The views of some frames.
 
@@ -88,9 +93,10 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
             shadows.
     """
     kept = layout_path(folder or job.output.directory)
-    facets = load_display(load_display_file(job.display))
+    facets, choice = facets_and_layout(job)
     raise_all(JobError, facet_problems(job, facets.count))
-    layout = layout_for(job.layout or PackSpec(), facets, kept)
+    layout = layout_for(choice, facets, kept)
+    raise_all(JobError, names_problems(job, len(layout.pages), facets.count))
     demand_memory(job, layout)
     store = TextureStore(texture_limits(job))
     scene, source = load_moving_scene(scene_spec(job), float(job.fps), store)
@@ -111,6 +117,15 @@ def texture_limits(job: JobFile) -> TextureLimits:
     """What the textures of a job may take, and how well they are filtered."""
     how = job.render
     return TextureLimits(how.texture_memory, how.max_texture, how.anisotropy)
+
+
+def facets_and_layout(job: JobFile) -> tuple[Facets, Path | PackSpec | UvLayoutSpec]:
+    """The facets of a job, and what it says of their layout; of a proxy with fewer pixels, packed anew."""
+    facets, choice = load_display(load_display_file(job.display)), job.layout or PackSpec()
+    if job.render.scale == 1:
+        return facets, choice
+    wishes = choice.model_copy(update={"size": None, "pins": None}) if isinstance(choice, PackSpec) else None
+    return scaled(facets, job.render.scale), wishes or PackSpec()
 
 
 def stage_of(job: JobFile, facets: Facets, layout: Layout, scene: Scene, bleed: int) -> Stage:

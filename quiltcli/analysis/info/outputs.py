@@ -11,7 +11,7 @@ from quiltcli.analysis.info.record import Info, counted
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.capacity import bytes_text
 from quiltcli.formats.inputs import is_regular, read_input
-from quiltcli.images.names import name_of
+from quiltcli.images.names import names_in
 from quiltcli.job.frames import format_frames
 
 
@@ -27,8 +27,8 @@ def output_info(path: Path) -> Info:
         )
         raise OutputError(Problem(words, file=str(path)))
     entries = _entries(path / "report.json")
-    images = [file for folder in ("quilt", "facets") for file in (path / folder).glob("*.exr")]
-    names = [name for name in map(name_of, images) if name is not None]
+    found = list(names_in(path).found(path))
+    names, images = [name for name, _ in found], [file for _, file in found]
     counts = Counter(name.kind for name in names)
     frames = sorted({name.frame for name in names})
     size = sum(file.stat().st_size for file in images)

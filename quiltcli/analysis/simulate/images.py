@@ -11,7 +11,6 @@ from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.images.facets import page_of, quilt_buffers
 from quiltcli.images.layers import read_view
 from quiltcli.images.metadata import is_complete
-from quiltcli.images.names import facet_path, quilt_path
 from quiltcli.images.window import whole_frame
 from quiltcli.layout import pixel_owners
 from quiltcli.render.buffers import Buffers, new_buffers
@@ -56,7 +55,7 @@ def shown_images(
 
 def _quilts(stage: Stage, view: View, folder: Path, job_sha: str) -> Buffers | None:
     """The quilt on disk, None where a page is missing or not this job's."""
-    paths = [quilt_path(folder, page + 1, *view.file_key) for page in range(len(stage.layout.pages))]
+    paths = [stage.names.page(folder, page + 1, *view.file_key) for page in range(len(stage.layout.pages))]
     if not all(is_complete(path, job_sha, view.frame) for path in paths):
         return None
     buffers = {name: np.zeros(stage.owners.size, dtype=np.float16) for name in "RGB"}
@@ -72,7 +71,7 @@ def _quilts(stage: Stage, view: View, folder: Path, job_sha: str) -> Buffers | N
 def _facets(stage: Stage, lit: BoolArray, view: View, folder: Path, job_sha: str) -> Buffers | None:
     """The quilt put together from the lit facets' images on disk, None where one is missing."""
     rows = np.flatnonzero(lit).tolist()
-    paths = {row: facet_path(folder, int(stage.layout.facet[row]), *view.file_key) for row in rows}
+    paths = {row: stage.names.facet(folder, int(stage.layout.facet[row]), *view.file_key) for row in rows}
     if not paths or not all(is_complete(path, job_sha, view.frame) for path in paths.values()):
         return None
     images = {}

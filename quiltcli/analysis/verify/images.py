@@ -10,7 +10,6 @@ import numpy as np
 from quiltcli.channels import empty_buffers
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.images.metadata import is_complete
-from quiltcli.images.names import quilt_path
 from quiltcli.job import job_sha256
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.methods import draw_view
@@ -57,7 +56,7 @@ def find_images(stage: Stage, view: View, folder: Path, threads: int, redraw: bo
     """
     channels = stage.job.output.channels
     out = outputs(stage, folder, job_sha256(stage.job))
-    pages = [quilt_path(folder, page + 1, *view.file_key) for page in range(len(stage.layout.pages))]
+    pages = [stage.names.page(folder, page + 1, *view.file_key) for page in range(len(stage.layout.pages))]
     if redraw:
         return draw_images(stage, view, threads)
     if not all(is_complete(path, out.job_sha, view.frame) for path in pages):

@@ -7,7 +7,6 @@ alike; a mirrored one would need a left-handed camera, which no renderer has.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -16,12 +15,12 @@ import numpy as np
 from quiltcli.display import Facets
 from quiltcli.errors import DisplayError, Problem, raise_all
 from quiltcli.geometry import FloatArray, cross, dot
+from quiltcli.images.names import fit_names
 from quiltcli.viewer.view import View
 from quiltcli.viewer.viewer import Viewer
 
 _SQUARE = 1e-9
 _IN_PLANE = 1e-9  # metres
-_PLAIN = re.compile(r"[A-Za-z_][\w-]*")
 
 
 @dataclass(frozen=True)
@@ -99,10 +98,7 @@ def shots(facets: Facets, views: Sequence[View]) -> list[Shot]:
 
 def camera_names(facets: Facets) -> tuple[str, ...]:
     """A name for every facet: its own where that is fit and single, else `facet_0001`."""
-    return tuple(
-        name if _PLAIN.fullmatch(name) and facets.names.count(name) == 1 else f"facet_{k:04}"
-        for k, name in enumerate(facets.names, 1)
-    )
+    return fit_names(facets.names)
 
 
 def _unfit(facets: Facets) -> Iterator[Problem]:

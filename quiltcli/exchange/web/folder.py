@@ -13,7 +13,6 @@ from quiltcli.display import lit_facets
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.exr.image import read_header
 from quiltcli.images.metadata import is_complete
-from quiltcli.images.names import facet_path, name_of, quilt_path
 from quiltcli.job import load_job
 from quiltcli.job.frames import format_frames
 from quiltcli.render.setup import Stage, set_stage
@@ -48,15 +47,10 @@ def open_folder(path: Path) -> Folder:
         raise OutputError(Problem(wrong, file=str(path)))
     job = load_job(path / "job.yaml")
     stage = set_stage(with_channels(job, ("rgba",)))
-    frames = tuple(sorted({found.frame for found in map(name_of, _images(path)) if found}))
+    frames = tuple(sorted({name.frame for name, _ in stage.names.found(path)}))
     if not frames:
         raise OutputError(Problem("has no images of frames (run quilt render first)", file=str(path)))
     return Folder(path, stage, frames)
-
-
-def _images(path: Path) -> list[Path]:
-    """The images of a folder, for one eye."""
-    return [*path.glob("quilt/page_*.exr"), *path.glob("facets/facet_*.exr")]
 
 
 def chosen_frames(folder: Folder, wanted: Sequence[int] | None, most: int) -> tuple[int, ...]:
@@ -85,12 +79,12 @@ def images_sha(folder: Folder, frame: int) -> str:
     Raises:
         OutputError: the frame is not there, not whole, or was made for another place of the eye.
     """
-    layout = folder.stage.layout
+    layout, names = folder.stage.layout, folder.stage.names
     view = views_at(folder.stage.job, frame)[0]  # of two eyes the left
-    pages = [quilt_path(folder.path, page + 1, *view.file_key) for page in range(len(layout.pages))]
+    pages = [names.page(folder.path, page + 1, *view.file_key) for page in range(len(layout.pages))]
     eye = view.viewer.eye
     lit = lit_facets(folder.stage.facets, eye) & (layout.page >= 0)  # a render may leave the others out
-    facets = [facet_path(folder.path, facet, *view.file_key) for facet in layout.facet[lit].tolist()]
+    facets = [names.facet(folder.path, facet, *view.file_key) for facet in layout.facet[lit].tolist()]
     found = [paths for paths in (pages, facets) if paths and paths[0].is_file()]
     if not found:
         wrong = f"has no images of frame {frame} (it has {format_frames(folder.frames)})"

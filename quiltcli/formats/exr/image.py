@@ -213,6 +213,11 @@ def part_names(path: Path) -> tuple[str, ...]:
     return tuple(header.get("name", "") for header in _read_headers(path))
 
 
+def read_first(path: Path) -> Image:
+    """The first part of a file, whatever others there are: the left eye's; errors as for `read_parts`."""
+    return read_parts(path)[0]
+
+
 def read_header(path: Path) -> Image:
     """Everything of the first part but its pixels (`channels` is empty); errors as for `read_parts`."""
     return _image(_read_headers(path)[0], {})

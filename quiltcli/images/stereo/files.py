@@ -14,7 +14,7 @@ from quiltcli.formats.exr.image import Image, part_names, write_exr
 from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import Float32Array
 from quiltcli.images.layers import read_view
-from quiltcli.images.names import frame_digits, name_of
+from quiltcli.images.names import frame_digits, names_in
 from quiltcli.images.stereo.anaglyph import MATRICES, anaglyph, luma
 from quiltcli.images.stereo.packing import (
     PACKINGS,
@@ -30,7 +30,6 @@ from quiltcli.layout import Layout, pixel_owners, read_layout
 
 EYES = ("left", "right")
 MODES = ("anaglyph", *PACKINGS, *TURNS, "sequential", "rgb-frames")
-FOLDERS = {"page": "quilt", "facet": "facets"}
 
 
 @dataclass(frozen=True)
@@ -94,9 +93,8 @@ def find_pairs(out: Path, options: StereoOptions) -> list[Pair]:
     """The pairs of images that a folder holds, by number, then by frame (OutputError if there are none)."""
     kind = options.kind
     found: dict[tuple[int, int], dict[str, tuple[Path, str]]] = {}
-    for path in sorted((out / FOLDERS[kind]).glob(f"{kind}_*.exr")):
-        name = name_of(path)
-        if name is None or (options.frames is not None and name.frame not in options.frames):
+    for name, path in names_in(out).found(out):
+        if name.kind != kind or (options.frames is not None and name.frame not in options.frames):
             continue
         parts = (name.eye,) if name.eye else part_names(path)
         eyes = dict.fromkeys(part.partition(".")[0] for part in parts if part.partition(".")[0] in EYES)

@@ -1,0 +1,1 @@
+"""`quilt project`: one picture made for the viewpoint, put on the facets."""
