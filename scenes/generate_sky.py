@@ -2,9 +2,9 @@
 
     python scenes/generate_sky.py
 
-`evening.exr` is a panorama of 256 × 128 half floats: a blue sky that gets warm towards the place where the sun
-has gone, a bright veil of cloud there, and ground. `mosaic.png` is a floor of coloured stones in rings,
-512 × 512. Both come of formulas alone.
+`evening.exr` is a panorama of 256 × 128 half floats: a blue sky that gets warm towards the sun, a bright
+veil of cloud before it, and ground. `mosaic.png` is a floor of coloured stones in rings, 512 × 512. Both come
+of formulas alone.
 """
 
 from __future__ import annotations
