@@ -53,13 +53,14 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) simulate scenes/show_corner.yaml -f 12 -o $(DOCS)/show_corner.png --size 960x720 --supersample 2
 	$(QUILT) render scenes/demo.yaml -f 6 --overwrite
 	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(DOCS)/box_quilt.png
+	$(QUILT) simulate scenes/demo_hall.yaml -f 1 -o $(DOCS)/textures.png --size 720x480 --supersample 3
 	$(QUILT) path scenes/demo_cave.yaml -o $(DOCS)/take.png
 	$(QUILT) simulate scenes/demo_cave.yaml -f 120 -o $(DOCS)/cave-take.png --size 960x600 --supersample 2 --third-person
 	mv $(DOCS)/cave-take.left.png $(DOCS)/cave-take.png && rm $(DOCS)/cave-take.right.png
 	$(QUILT) render scenes/demo.yaml -f 3 --overwrite --set output.channels='[rgba,Z,motion,cryptoobject]' --set render.samples=16
 	$(PY) docs/pictures/channels.py out/demo/facets/facet_0001.0003.exr -o $(DOCS)/channels.png
 	$(PY) docs/pictures/motion_blur.py -o $(DOCS)/motion-blur.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/show_*.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/show_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2

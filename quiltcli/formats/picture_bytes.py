@@ -90,6 +90,8 @@ def _opened(data: bytes) -> Iterator[Any]:
     cut_off = data.startswith(_JPEG) and data.rfind(_END_OF_JPEG) < data.rfind(_SCAN_OF_JPEG)
     if cut_off or (data.startswith(_PNG) and not _whole_png(data)):
         raise UnreadablePictureError("it is damaged or cut off")
+    if data.startswith(_PNG):
+        _check_size(*struct.unpack_from(">II", data, len(_PNG) + 8))
     config = oiio.ImageSpec()
     config["oiio:UnassociatedAlpha"] = 1
     with _as_file(data) as name:
@@ -101,7 +103,7 @@ def _opened(data: bytes) -> Iterator[Any]:
             if picture is None:
                 raise UnreadablePictureError(_words(oiio.geterror() or "it is of no kind that is read"))
             try:
-                _check_size(picture.spec())
+                _check_size(picture.spec().width, picture.spec().height)
                 yield picture
             finally:
                 picture.close()
@@ -123,9 +125,9 @@ def _whole_png(data: bytes) -> bool:
     return kind == b"IEND"
 
 
-def _check_size(spec: Any) -> None:
-    if spec.width > MOST_SIDE or spec.height > MOST_SIDE or spec.width * spec.height > MOST_PIXELS:
-        size = f"it has {spec.width:,} × {spec.height:,} pixels (expected at most {MOST_PIXELS:,})"
+def _check_size(width: int, height: int) -> None:
+    if width > MOST_SIDE or height > MOST_SIDE or width * height > MOST_PIXELS:
+        size = f"it has {width:,} × {height:,} pixels (expected at most {MOST_PIXELS:,})"
         raise UnreadablePictureError(size)
 
 

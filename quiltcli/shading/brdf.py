@@ -102,16 +102,19 @@ def _lobe_table(scene: Scene) -> Float32Array:
 
 def lobes_at(scene: Scene, seen: Points) -> Lobes:
     """What light needs to know at points: worked out once a material where textures vary colours alone."""
+    tint = tint_at(scene, seen)
     varied = varied_parameters(scene, seen)
     if varied is not None:
-        lobes = lobes_of(varied)
+        lobes = replace(lobes_of(varied), tint=tint)
     else:
         table = at_materials(scene, _lobe_table(scene), seen.triangle)
         diffuse, metallic, dielectric, specular90, coat, alpha2 = table[6:]
-        lobes = Lobes(table[0:3], table[3:6], diffuse, metallic, dielectric, specular90, coat, alpha2)
-    tint = tint_at(scene, seen)
+        paint, emission = table[0:3], table[3:6]
+        lobes = Lobes(paint, emission, diffuse, metallic, dielectric, specular90, coat, alpha2, tint)
+    if tint is None and scene.textures is None:
+        return lobes
     emission = varied_emission(scene, seen, lobes.emission, tint)
-    return replace(lobes, tint=tint, emission=emission, open=occlusion_at(scene, seen))
+    return replace(lobes, emission=emission, open=occlusion_at(scene, seen))
 
 
 def alpha(scene: Scene, triangle: Int32Array) -> Values:

@@ -70,7 +70,7 @@ def test_a_zone_plate_shows_no_moire(tmp_path):
     nearest = np.abs(light[np.ix_(rows % 480, columns % 480)][on][far] - light.mean())
     assert np.sqrt(np.mean(strays**2)) < 0.05 < 0.3 < np.sqrt(np.mean(nearest**2))
     assert strays.max() < 0.16
-    assert np.ptp(seen[(radius < 30)[on]]) > 0.9
+    assert np.ptp(seen[(radius < 30)[on]]) > 0.8
 
 
 def test_every_pixel_of_a_magnified_picture_is_that_of_float64(tmp_path):

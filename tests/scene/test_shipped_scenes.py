@@ -29,6 +29,18 @@ def test_the_generator_wrote_the_meshes(tmp_path):
         assert (tmp_path / name).read_bytes() == (SCENES / name).read_bytes()
 
 
+def test_the_generator_drew_the_pictures(tmp_path):
+    program = f"import sys; sys.path.insert(0, {str(SCENES)!r}); import pictures, pathlib;"
+    subprocess.run(
+        [sys.executable, "-c", f"{program} pictures.write(pathlib.Path({str(tmp_path)!r}))"], check=True
+    )
+    made = sorted(path.name for path in tmp_path.iterdir())
+    assert made == sorted(path.name for path in SCENES.glob("*.png") if path.name != "mosaic.png")
+    for name in made:
+        new, old = (np.asarray(Image.open(folder / name)).astype(int) for folder in (tmp_path, SCENES))
+        assert np.abs(new - old).max() <= 1  # functions of other machines may round otherwise
+
+
 @pytest.mark.parametrize(
     ("name", "low", "high"),
     [
@@ -39,6 +51,7 @@ def test_the_generator_wrote_the_meshes(tmp_path):
         ("pavilion", (-0.265, 0, -0.265), (0.265, 0.29, 0.265)),
         ("pavilion_in_sphere", (-0.3, 0, -0.3), (0.3, 0.6, 0.3)),
         ("pavilion_on_corner", (-4.5, 3, -9.5), (4.5, 10, 0)),
+        ("hall", (-3, 0, -3), (3, 3.2, 3)),
     ],
 )
 def test_scenes_load_quietly_and_fit(name, low, high):

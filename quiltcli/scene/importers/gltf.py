@@ -204,7 +204,7 @@ def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
         triangles=placed_triangles(piece, mirrored),
         normals=there.normals,
         colors=colors,
-        surface=surface_of(gltf, gltf.materials[primitive.material]),
+        surface=surface_of(gltf.materials[primitive.material], gltf),
         uv=_v_up(primitive.uv[0], piece.copies),
         uv1=_v_up(primitive.uv[1], piece.copies),
         material=gltf.materials[primitive.material].name,
@@ -216,15 +216,15 @@ def _v_up(uv: FloatArray | None, copies: int) -> FloatArray | None:
     return None if uv is None else np.tile(np.stack((uv[:, 0], 1 - uv[:, 1]), axis=1), (copies, 1))
 
 
-def surface_of(gltf: Gltf, material: Material) -> Surface:
-    """The surface of a material."""
+def surface_of(material: Material, gltf: Gltf | None = None) -> Surface:
+    """The surface of a material; with its textures where the file that holds them is given."""
     return Surface(
         color=material.color[:3],
         metallic=material.metallic,
         roughness=material.roughness,
         emission=(0.0, 0.0, 0.0) if material.unlit else material.emission,
         unlit=material.unlit,
-        textures=tuple(_textures(gltf, material)),
+        textures=() if gltf is None else tuple(_textures(gltf, material)),
     )
 
 

@@ -14,7 +14,7 @@ from quiltcli.visibility.resolve.hits import Points
 from quiltcli.visibility.resolve.vectors import PointVectors, sum_of_products, vector_values
 
 _LEAST_FACING = np.float32(0.1)
-"""Least cosine between a bent normal and the direction to the eye, before its length is made 1."""
+"""Least cosine between a bent normal and the direction to the eye, unless the surface itself has less."""
 _ONE, _TWO, _TINY = np.float32(1), np.float32(2), np.float32(1e-30)
 
 
@@ -46,7 +46,8 @@ def bent(scene: Scene, seen: Points) -> Points:
     result = _unit(along * (side * strength * x) + up * (strength * y) + normal * z)
     # A slope that is turned away from the eye would be hidden: what is seen there is the rim before it.
     view = _unit(-ray)
-    result += view * np.maximum(_LEAST_FACING - sum_of_products(result, view), np.float32(0))
+    least = np.minimum(sum_of_products(normal, view), _LEAST_FACING)
+    result += view * np.maximum(least - sum_of_products(result, view), np.float32(0))
     mapped = edges.each(slot.image.take(material) >= 0)
     return replace(seen, normal=PointVectors(np.where(mapped, result, normal)))
 

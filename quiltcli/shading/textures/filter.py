@@ -1,9 +1,7 @@
-"""Looking textures up: bilinear between texels, trilinear between levels, anisotropic along footprints.
+"""Looking textures up: bilinear between texels, linear between levels, anisotropic along footprints.
 
-A pixel's footprint in a texture is an ellipse, the image of a circle by the Jacobian of the texture's
-coordinates. Its axes are singular values; several places along the longer one, each as wide as the shorter,
-fill it (Schilling, Knittel & Straßer 1996: Texram). Single precision throughout, by operations that are
-rounded alike on every machine: roots and products, no logarithms.
+Single precision throughout, by operations that are rounded alike on every machine: roots and products, no
+logarithms.
 """
 
 from __future__ import annotations
@@ -16,11 +14,11 @@ from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, Int32Array, IntArray, slices
 from quiltcli.scene.textures.pool import Textures
+from quiltcli.shading.textures.ellipse import between_levels, ellipses
 
 _CHUNK = 1 << 14  # places that fit the cache
 _ONE, _HALF = np.float32(1), np.float32(0.5)
-_MOST_STEP = np.float32(1e8)  # texels from pixel to pixel; the smallest level shows wherever it is more
-_TINY = np.float32(1e-20)
+_TWO_LEVELS, _WRAP = np.uint16(128), np.uint16(256)  # of numbers for how places are filtered
 # A half float's bits, moved to where a single's are, are its value times 2⁻¹¹². The weights make up for it:
 # a product of two small numbers would be denormal, which is ten times as slow.
 _SCALE = np.float32(2.0**112)
@@ -58,14 +56,15 @@ def look_up(
 class _Levels:
     """The levels of some places: arrays (n,), or numbers where all have one."""
 
-    first: Any
-    stride: Any
-    width: Any
-    height: Any
+    first: IntArray
+    stride: IntArray
+    width: Float32Array
+    height: Float32Array
 
 
-def _levels(textures: Textures, rows: NDArray[Any]) -> _Levels:
-    return _Levels(*(getattr(textures, name).take(rows) for name in ("first", "stride", "width", "height")))
+def _levels(textures: Textures, rows: IntArray) -> _Levels:
+    first, stride = textures.first.take(rows), textures.stride.take(rows)
+    return _Levels(first, stride, textures.width.take(rows), textures.height.take(rows))
 
 
 def _filtered(
@@ -78,87 +77,39 @@ def _filtered(
     out: Float32Array,
 ) -> None:
     """As `look_up`, of places that fit the cache, into `out`."""
-    base = textures.start.take(image)
-    last = textures.start.take(image + 1) - 1
+    base = textures.start.take(image).astype(np.int64)
+    last = textures.start.take(image + 1) - 1 - base
     wrap = textures.wrap.take(image, axis=0)
     wide, high = textures.width.take(base), textures.height.take(base)
-    count, level, du, dv = _ellipse(slopes, wide, high, textures.anisotropy)
-    # All that are filtered alike together: places that show texels enlarged, and others by how many
-    # places along the ellipse they look at.
-    kind = count + np.uint16(128) * (3 * wrap[:, 0] + wrap[:, 1]).astype(np.uint16)
-    present = np.flatnonzero(np.bincount(kind))
-    order = None if present.size == 1 else np.argsort(kind, kind="stable")
+    seen = ellipses(slopes, wide, high, textures.anisotropy)
+    near, share = between_levels(seen.level, last)
+    near += base
+    # All that are filtered alike together: places that show texels enlarged, others by how many places along
+    # the ellipse they look at, and whether in one level or in two.
+    kind = seen.places + _TWO_LEVELS * (share > 0)
+    kind += _WRAP * (3 * wrap[:, 0] + wrap[:, 1]).astype(np.uint16)
+    count = np.bincount(kind)
+    present = np.flatnonzero(count).tolist()
+    order = np.argsort(kind, kind="stable") if len(present) > 1 else np.arange(kind.size)
     end = 0
-    for which in present.tolist():
-        if order is None:
-            some: Any = slice(None)
-        else:
-            start, end = end, end + int(np.count_nonzero(kind == which))
-            some = order[start:end]
-        code, places = divmod(which, 128)
-        one = slice(None) if base.size == 1 else some
-        rows = base[one]
-        along = _Along(u[some], v[some], du[some], dv[some], divmod(code, 3))
-        if not places:
-            value = _sum(textures, along, 1, [(_levels(textures, rows), _SCALE)], channels)
-        else:
-            depth = np.minimum(level[some], (last - base)[one].astype(np.float32))
-            whole = np.floor(depth)
-            share = depth - whole
-            near = rows + whole.astype(np.int32)
-            far = np.minimum(near + 1, last[one])
-            weight = share * (_SCALE / np.float32(places))
-            both = [
-                (_levels(textures, near), _SCALE / np.float32(places) - weight),
-                (_levels(textures, far), weight),
-            ]
-            value = _sum(textures, along, places, both, channels)
-        for k, values in enumerate(value):
+    for which in present:
+        start, end = end, end + int(count[which])
+        some = order[start:end] if len(present) > 1 else slice(None)
+        code, rest = divmod(which, int(_WRAP))
+        two, places = divmod(rest, int(_TWO_LEVELS))
+        along = _Along(u[some], v[some], divmod(code, 3))
+        if places > 1:
+            du, dv = seen.axes(some)
+            along.du = du / (wide if wide.size == 1 else wide[some])
+            along.dv = dv / (high if high.size == 1 else high[some])
+        rows = near[some]
+        weight = _SCALE / np.float32(max(places, 1))
+        weighted: list[tuple[_Levels, Any]] = [(_levels(textures, rows), weight)]
+        if two:
+            part = share[some] * weight
+            weighted = [(weighted[0][0], weight - part), (_levels(textures, rows + 1), part)]
+        for k, values in enumerate(_sum(textures, along, max(places, 1), weighted, channels)):
             out[k, some] = values
-
-
-def _ellipse(
-    slopes: Float32Array, wide: Float32Array, high: Float32Array, most: int
-) -> tuple[NDArray[np.uint16], Float32Array, Float32Array, Float32Array]:
-    """How footprints are looked at.
-
-    Args:
-        slopes: (4, n) of u and v.
-        wide: (n,) or (1,) texels of the largest level.
-        high: the same.
-        most: places at most.
-
-    Returns:
-        (n,) places, 0 where texels are enlarged; (n,) level, 0 for the largest; the longer axis (n,) in u
-        and (n,) in v.
-    """
-    ux, uy = (np.clip(slope * wide, -_MOST_STEP, _MOST_STEP) for slope in slopes[:2])
-    vx, vy = (np.clip(slope * high, -_MOST_STEP, _MOST_STEP) for slope in slopes[2:])
-    p, r, q = ux * ux + uy * uy, vx * vx + vy * vy, ux * vx + uy * vy
-    mean, half = (p + r) * _HALF, (p - r) * _HALF
-    spread = np.sqrt(half * half + q * q)
-    long2 = mean + spread
-    short2 = np.maximum(mean - spread, _ONE)
-    count = np.minimum(np.ceil(np.sqrt(long2 / short2)), np.float32(most))
-    np.maximum(count, _ONE, out=count)
-    level = np.maximum(_log2(np.maximum(long2 / (count * count), _ONE)) * _HALF, np.float32(0))
-    # The eigenvector of the longer axis, by the row that says more of it.
-    steep = p >= r
-    x, y = np.where(steep, long2 - r, q), np.where(steep, q, long2 - p)
-    scale = np.sqrt(long2 / np.maximum(x * x + y * y, _TINY))
-    places = count.astype(np.uint16)
-    places[long2 <= _ONE] = 0
-    return places, level, x * scale / wide, y * scale / high
-
-
-def _log2(value: Float32Array) -> Float32Array:
-    """Binary logarithm of numbers from 1 on, to 0.008: the exponent, and a polynomial of the rest."""
-    bits = value.view(np.int32)
-    exponent = (bits >> 23) - 127
-    part = ((bits & 0x7FFFFF) | 0x3F800000).view(np.float32)
-    result: Float32Array = exponent.astype(np.float32)
-    result += (part - _ONE) * (np.float32(1.6838) - np.float32(0.3419) * part)
-    return result
 
 
 @dataclass
@@ -167,14 +118,14 @@ class _Along:
 
     u: Float32Array
     v: Float32Array
-    du: Float32Array
-    dv: Float32Array
     wrap: tuple[int, int]
+    du: Float32Array | None = None
+    dv: Float32Array | None = None
 
     def at(self, share: np.float32) -> tuple[Float32Array, Float32Array]:
         """Places so far along, from 0 to 1."""
         u, v = self.u, self.v
-        if share:
+        if self.du is not None and self.dv is not None and share:
             u, v = u + share * self.du, v + share * self.dv
         return _WRAPPED[self.wrap[0]](u), _WRAPPED[self.wrap[1]](v)
 
