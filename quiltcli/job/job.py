@@ -48,6 +48,7 @@ LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
 COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
 CLIPS = ("auto", "planar", "distance")
 STEREO = ("files", "parts")
+SIDES = ("all", "file")
 PARTS = ("layers", "parts")
 _NAME = re.compile(r"[\w-]+")
 MOST_SAMPLES = 4096
@@ -163,6 +164,8 @@ class RenderSpec(Model):
     """Draw the shadows of lights that have them."""
     ambient_occlusion: OcclusionSpec | None = None
     """Darken places by what is near them, in light from everywhere that has no shadows."""
+    double_sided: Annotated[str, OneOf(SIDES)] = "all"
+    """Surfaces whose backs are seen: all, or those that their files call so (file)."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
     anisotropy: Annotated[int, Field(ge=1, le=MOST_PLACES)] = 16

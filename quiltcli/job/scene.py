@@ -19,6 +19,7 @@ from quiltcli.job.model import (
     FileModel,
     Listed,
     Model,
+    NotNegative,
     Number,
     OneOf,
     Rgb,
@@ -90,6 +91,14 @@ class MaterialSpec(Model):
     """Show exactly `color`, whatever the lights."""
     specular: Unit | None = None
     """1 for a surface that also reflects the lamps themselves, 0 for a matte one; metals always do."""
+    opacity: Unit | None = None
+    """How much light the surface holds up: 1 all, 0 none."""
+    alpha: Annotated[str, OneOf(("opaque", "mask", "blend"))] | None = None
+    """What opacity means: nothing (opaque), there or not (mask), or a share of light (blend)."""
+    cutoff: NotNegative | None = None
+    """The least opacity that a mask shows; 0.5 when neither this nor the mesh file says."""
+    double_sided: bool | None = None
+    """Whether its back is seen, in jobs with `render.double_sided: file`."""
     textures: TexturesSpec | None = None
     """Pictures that vary the material; they multiply `color`, `emission`, `metallic` and `roughness`."""
 

@@ -26,6 +26,7 @@ from quiltcli.render.buffers import Buffers
 from quiltcli.render.setup import Stage
 from quiltcli.render.sums import Sums, new_sums
 from quiltcli.shading.aovs import shaded_for, wanted_for
+from quiltcli.shading.layers import layers
 from quiltcli.shading.shadows import Sample
 from quiltcli.visibility.draw import Cells, Frame, draw
 
@@ -68,9 +69,7 @@ def draw_samples(
         buffers: written to, at every pixel that any sample sees.
         channels: some of `sums.summed`.
     """
-    first, size = _addresses(stage, batch)
-    sums = Sums(new_sums(channels, lambda dtype: np.zeros(size, dtype)), channels, first)
-    count = stage.job.render.samples
+    sums, count = new_batch_sums(stage, batch, channels), stage.job.render.samples
     add_samples(stage, frame, batch, sums, sample_places(count))
     sums.store(buffers, count, stage.scene.background)
 
@@ -96,7 +95,15 @@ def add_samples(
         drawing = draw(frame, batch, in_quilt(stage.layout, place), cells)
         for shaded in shaded_for(sums.channels, drawing, wanted, scene, frame.viewer.eye, sample):
             sums.add(shaded)
+        for layer in layers(drawing, wanted, scene, frame.viewer.eye, sample):
+            sums.add(layer.shaded, layer.weight)
         drawing.done()
+
+
+def new_batch_sums(stage: Stage, batch: tuple[int, int], channels: tuple[str, ...]) -> Sums:
+    """Sums of channels for the pixels of a batch."""
+    first, size = _addresses(stage, batch)
+    return Sums(new_sums(channels, lambda dtype: np.zeros(size, dtype)), channels, first)
 
 
 def _addresses(stage: Stage, batch: tuple[int, int]) -> tuple[int, int]:

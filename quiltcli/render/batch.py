@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray
+from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.projection.gaze import Gaze
-from quiltcli.render.antialiasing import draw_samples
+from quiltcli.render.antialiasing import draw_samples, new_batch_sums
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
 from quiltcli.render.sums import summed
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
+from quiltcli.shading.layers import layers
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
 
@@ -71,10 +72,43 @@ def draw_batch(
         visible += shaded.hits.inside
     if stale.any():
         empty_missed(stage, drawing, stale, first, buffers)
+    if drawing.soft is not None:
+        visible += draw_layers(stage, drawing, batch, buffers, channels, wanted, gaze, frame.order)
     tiles = np.full(stale.size, not mends_itself(stage))
     tiles[drawing.drawn() - first] = True
     drawing.done()
     return Drawn(visible, tiles)
+
+
+def draw_layers(
+    stage: Stage,
+    drawing: Drawing,
+    batch: tuple[int, int],
+    buffers: Buffers,
+    channels: tuple[str, ...],
+    wanted: Wanted,
+    gaze: Gaze,
+    order: DepthOrder | None,
+) -> int:
+    """Write `channels` at the pixels that are seen through something; how many inside facets show the scene.
+
+    Light goes through all layers; other channels are those of the first that holds up any.
+    """
+    light = summed(channels)
+    data = tuple(name for name in channels if name not in light)
+    sums, visible = new_batch_sums(stage, batch, light), 0
+    for layer in layers(drawing, wanted, stage.scene, gaze.viewer.eye):
+        if light:
+            sums.add(layer.shaded, layer.weight)
+        if layer.first.any():
+            visible += int(np.count_nonzero(layer.first & layer.inside))
+            mine = np.flatnonzero(layer.first)
+            fill(buffers, data, gaze, layer.shaded, mine)
+            if order is not None:
+                fill_stored(buffers, order, layer.shaded.hits, mine)
+    if light:
+        sums.store(buffers, 1, stage.scene.background)
+    return visible
 
 
 def empty_missed(stage: Stage, drawing: Drawing, stale: BoolArray, first: int, buffers: Buffers) -> None:
@@ -95,11 +129,11 @@ def ordered(stage: Stage, frame: Frame) -> Frame:
     )
 
 
-def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits) -> None:
+def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits, some: IntArray | None = None) -> None:
     """Write into `zv` what the depth buffer holds, and into `Z` the depth that it is taken for."""
     wanted = [name for name in ("zv", "Z") if name in buffers]
     if wanted:
         assert hits.position is not None
         stored = dict(zip(("zv", "Z"), order.stored(hits.facet, hits.position), strict=True))
         for name in wanted:
-            hits.put(buffers[name], stored[name])
+            hits.put(buffers[name], stored[name], some)

@@ -147,6 +147,7 @@ def plan_of(stage: Stage, viewer: Viewer, rays: QuiltRays) -> BinPlan:
         rays,
         culling=how.backface_culling,
         reach=0.5 if how.samples > 1 else 0.0,
+        one_sided=how.double_sided == "file",
     )
 
 

@@ -20,6 +20,8 @@ from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import light_at_points
 from quiltcli.shading.mattes import identities_of
 
+_ONE = np.float32(1)
+
 
 def summed(channels: tuple[str, ...]) -> tuple[str, ...]:
     """Those of the channels that are made of all samples of a pixel."""
@@ -50,27 +52,39 @@ class Sums:
         """How many addresses there are."""
         return int(self._memory["cover"].size)
 
-    def add(self, shaded: Shaded) -> None:
-        """Add what is seen at one sample of some pixels, each of them once."""
+    def add(self, shaded: Shaded, weight: Float32Array | None = None) -> None:
+        """Add what is seen at one sample of some pixels, each of them once.
+
+        Args:
+            shaded: what is seen.
+            weight: (P,) share of the sample's light that comes from there; None for all of it.
+        """
         pixel = shaded.hits.pixel - self._first
-        self._memory["cover"][pixel] += 1
+        self._memory["cover"][pixel] += _ONE if weight is None else weight
         for name in self.channels:
             if CHANNELS[name].matte:
                 identity = identities_of(shaded.scene, name, shaded.hits.triangle)
-                self._note(name, pixel, shaded.hits.drawn(identity[:, None]))
+                self._note(name, pixel, shaded.hits.drawn(identity[:, None]), weight)
                 continue
             for k, values in enumerate(light_at_points(name, shaded)):
-                self._memory[f"{name}.{k}"][pixel] += shaded.hits.drawn(np.minimum(values, MOST_HALF))
+                values = shaded.hits.drawn(np.minimum(values, MOST_HALF))
+                self._memory[f"{name}.{k}"][pixel] += values if weight is None else weight * values
 
-    def _note(self, name: str, pixel: IntArray, identity: NDArray[np.uint32]) -> None:
-        """Count identities (P,) at pixels (P,)."""
+    def _note(
+        self, name: str, pixel: IntArray, identity: NDArray[np.uint32], weight: Float32Array | None
+    ) -> None:
+        """Count identities (P,) at pixels (P,), where they have any weight."""
+        if weight is not None:
+            some = weight > 0
+            pixel, identity, weight = pixel[some], identity[some], weight[some]
         for k in range(RANKS):
             slot = self._memory[f"{name}.identity{k}"]
             there = slot[pixel]
             mine = (there == identity) | (there == 0)
             slot[pixel[mine]] = identity[mine]
-            self._memory[f"{name}.share{k}"][pixel[mine]] += 1
+            self._memory[f"{name}.share{k}"][pixel[mine]] += _ONE if weight is None else weight[mine]
             pixel, identity = pixel[~mine], identity[~mine]
+            weight = None if weight is None else weight[~mine]
             if not pixel.size:
                 return
 

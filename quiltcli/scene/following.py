@@ -46,7 +46,7 @@ def _knowing(scene: Scene, table: Float32Array) -> Scene:
     return replace(scene, corner_motion=table).knowing(**tables)
 
 
-_KEPT = ("planes", "facing", "corner_normals", "corner_colors")
+_KEPT = ("planes", "facing", "corner_normals", "corner_colors", "soft", "corner_opacities")
 
 
 def _same_triangles(a: FloatArray, some: Int32Array, b: FloatArray, others: Int32Array) -> bool:

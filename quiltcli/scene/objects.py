@@ -143,7 +143,7 @@ def _parts(parts: Sequence[Part], matrix: FloatArray | None, override: dict[str,
     if matrix is not None:
         parts = tuple(placed(part, matrix) for part in parts)
     if "color" in override:
-        parts = tuple(replace(part, colors=None) for part in parts)
+        parts = tuple(replace(part, colors=None, opacities=None) for part in parts)
     return tuple(parts)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.channels import CHANNELS, MOST_HALF
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.projection.gaze import Gaze
 from quiltcli.scene import Scene
 from quiltcli.scene.textures.coordinates import corner_coordinates
@@ -187,12 +187,18 @@ def shaded_for(
     return (Shaded(scene, eye, hits) for hits in drawing.hits(wanted, scene))
 
 
-def fill(buffers: Mapping[str, Values], names: Iterable[str], gaze: Gaze, shaded: Shaded) -> None:
-    """Write the channels `names` of all hits into flat `buffers`, at the pixels the hits belong to."""
+def fill(
+    buffers: Mapping[str, Values],
+    names: Iterable[str],
+    gaze: Gaze,
+    shaded: Shaded,
+    some: IntArray | None = None,
+) -> None:
+    """Write the channels `names` of all hits, or of some, into flat `buffers`, at the hits' pixels."""
     for name in names:
         values_of = SOURCES[name].values
         for layer, values in zip(CHANNELS[name].layers, values_of(gaze, shaded), strict=True):
-            shaded.hits.put(buffers[layer], values)
+            shaded.hits.put(buffers[layer], values, some)
 
 
 _SCALE = 2.0**-112

@@ -20,6 +20,7 @@ from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.resolve.footprints import Cells
 from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
+from quiltcli.visibility.resolve.layers import LayerHits, layer_hits
 from quiltcli.visibility.resolve.pixels import MixedTiles
 from quiltcli.visibility.resolve.reader import Reader
 from quiltcli.visibility.resolve.tiles import missed_pixels
@@ -31,6 +32,7 @@ from quiltcli.visibility.scan.keys import serial_bits
 from quiltcli.visibility.scan.large import covering_keys, draw_large
 from quiltcli.visibility.scan.order import BatchOrder
 from quiltcli.visibility.scan.small import LIMIT, draw_small
+from quiltcli.visibility.scan.soft import Fragments, apart, soft_fragments
 from quiltcli.visibility.scan.spans import large_spans
 from quiltcli.visibility.setup.blocks import (
     Blocks,
@@ -120,6 +122,7 @@ class Drawing:
         table: planes of the pairs.
         limits: how depth is measured.
         bits: bits of the serial in a key.
+        soft: pixels that are seen through something, which the canvas has not; None where there are none.
         cells: the parts of pixels that its samples stand for; None for all of them.
     """
 
@@ -129,6 +132,7 @@ class Drawing:
     limits: DepthRange
     bits: int
     cells: Cells | None = None
+    soft: Fragments | None = None
 
     def regions(
         self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None, largest: int = SQUARE
@@ -140,10 +144,21 @@ class Drawing:
             scene: what was drawn; its normals are needed where they are wanted.
             largest: microtiles from side to side of the largest regions, SQUARE or 1.
         """
-        reader = Reader(
-            self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted, self.cells
-        )
-        return read_canvas(reader, largest)
+        return read_canvas(self._reader(wanted, scene), largest)
+
+    def _reader(self, wanted: Wanted, scene: Scene | None) -> Reader:
+        return Reader(self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted, self.cells)
+
+    def layers(self, light: BoolArray, wanted: Wanted, scene: Scene) -> Iterator[LayerHits]:
+        """The pixels that are seen through something, layer by layer from the front.
+
+        Args:
+            light: (n,) which of the pixels of `soft` light still passes; whoever takes a layer notes the end.
+            wanted: what the hits shall tell.
+            scene: what was drawn.
+        """
+        assert self.soft is not None
+        return layer_hits(self._reader(wanted, scene), self.soft, light)
 
     def hits(self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None) -> Iterator[Hits]:
         """What the pixels see, each of the batch at most once; see `regions`."""
@@ -211,6 +226,9 @@ def draw(
     table = PlaneTable(pairs.triangle.size)
     width, height = pairs.box[1] - pairs.box[0], pairs.box[3] - pairs.box[2]
     some = np.minimum(width, height) >= 0
+    light = np.zeros(0, dtype=np.int64)
+    if frame.sight.soft is not None:
+        some, light = apart(pairs, frame.sight.soft, some)
     small = np.maximum(width, height) < LIMIT
     large = table.add(pairs, np.flatnonzero(some & ~small)).compact()
     # All at once: the more a tile has been offered, the more of it is known to be hidden.
@@ -219,4 +237,6 @@ def draw(
     rows, culled = np.flatnonzero(some & small), frame.sight.culled
     draw_small(pairs, rows, table, canvas, limits, bits, by, covering, culled=culled)
     draw_large(large, spans, covering, canvas, limits, bits, by)
-    return Drawing(frame.blocks, canvas, table, limits, bits, cells)
+    # What lies before all that is opaque.
+    soft = soft_fragments(pairs, light, table, canvas, limits, bits, by) if light.size else None
+    return Drawing(frame.blocks, canvas, table, limits, bits, cells, soft)

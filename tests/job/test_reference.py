@@ -19,7 +19,7 @@ MEASURES = r"metre|pixel|degree|second|frame|m, cm|megabyte|linear|radian|m/s|Hz
 BARE = {
     *("quilt_display", "quilt_job", "quilt_layout", "quilt_scene"),
     *("id", "page", "max_pages", "page_facets", "samples"),
-    *("aspect", "metallic", "roughness", "specular", "scale", "matrix", "facets"),
+    *("aspect", "metallic", "roughness", "specular", "opacity", "cutoff", "scale", "matrix", "facets"),
     *("look", "up", "direction", "color", "emission", "orientation"),
     *("uv_set", "offset", "strength"),
 }

@@ -132,12 +132,15 @@ def test_metal_reflects_though_it_is_called_matte():
     np.testing.assert_array_equal(glossy, matte)
 
 
+def tables_of(some, others):
+    """Materials of two tables."""
+    pairs = zip(vars(some).values(), vars(others).values(), strict=True)
+    return Materials(*(None if a is None else np.concatenate((a, b)) for a, b in pairs))
+
+
 def test_matte_and_glossy_points_do_not_change_each_other():
     scene = wall(lights([[0.1, -0.4, -1]], [[3, 3, 3]]))
-    two = Materials(
-        *(np.concatenate(pair) for pair in zip(vars(materials(specular=0.0)).values(),
-          vars(materials()).values(), strict=True))
-    )  # fmt: skip
+    two = tables_of(materials(specular=0.0), materials())
     scene = replace(
         scene, triangles=np.repeat(scene.triangles, 2, 0), flat=np.zeros(2, bool),
         material=np.array([0, 1], np.int32), materials=two,
@@ -199,10 +202,7 @@ def test_white_furnace_returns_no_more_than_it_gets(metallic, roughness, slope):
 def test_bytes_do_not_depend_on_what_is_shaded_together():
     rng = np.random.default_rng(3)
     scene = wall(lights([[0.1, -1, -0.3]], [[3, 3, 3]], [[1, 1, 1]], [[2, 2, 2]], headlight=True))
-    two = Materials(
-        *(np.concatenate(pair) for pair in zip(vars(scene.materials).values(),
-          vars(materials(color=(1, 0, 0), metallic=1.0)).values(), strict=True))
-    )  # fmt: skip
+    two = tables_of(scene.materials, materials(color=(1, 0, 0), metallic=1.0))
     scene = replace(
         scene, triangles=np.repeat(scene.triangles, 2, 0), flat=np.zeros(2, bool),
         material=np.array([0, 1], np.int32), materials=two,

@@ -24,11 +24,11 @@ from quiltcli.geometry import IntArray
 from quiltcli.job import JobFile
 from quiltcli.projection.planar import quilt_rays
 from quiltcli.render.crew import default_threads
+from quiltcli.render.methods.raycast import target_of
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import View, views_of
 from quiltcli.viewer.viewer import Viewer
-from quiltcli.visibility.rays.embree import aim
 from quiltcli.visibility.rays.exact import Neighbours
 
 SAMPLE = 200_000
@@ -217,7 +217,7 @@ def make_trial(stage: Stage, viewer: Viewer, images: Images) -> Trial:
     """Prepare what the pixels of a frame are verified with."""
     scene = stage.scene
     rays = quilt_rays(stage.layout, their_lit_facets(stage.facets, viewer), viewer.eye)
-    target = aim(scene.vertices, scene.triangles, viewer, stage.job.render.backface_culling)
+    target = target_of(stage, viewer)
     neighbours = Neighbours(scene.vertices, scene.triangles)
     return Trial(stage.layout, stage.owners, rays, target, neighbours, images)
 

@@ -52,7 +52,7 @@ def cast_frame(
         lit &= only
     rays = quilt_rays(stage.layout, lit, viewer.eye)
     gaze = Gaze(viewer, rays)
-    target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
+    target = target_of(stage, viewer)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     sloped = stage.scene.textures is not None
     clear(stage, buffers, only)
@@ -78,6 +78,23 @@ def cast_frame(
         fill=stage.fill,
         seconds={"cast and shade": time.perf_counter() - begin},
         warnings=() if visible else ("no pixel shows the scene",),
+    )
+
+
+def target_of(stage: Stage, viewer: Viewer) -> Target:
+    """The stage's scene as rays of a viewer meet it.
+
+    Raises:
+        MissingExtraError: there is no Embree on this machine.
+    """
+    scene, how = stage.scene, stage.job.render
+    return aim(
+        scene.vertices,
+        scene.triangles,
+        viewer,
+        how.backface_culling,
+        one_sided=scene.one_sided if how.double_sided == "file" else None,
+        invisible=scene.invisible,
     )
 
 

@@ -197,8 +197,11 @@ def contested_channels(model: GltfModel, playing: Playing) -> int:
 def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
     primitive = piece.primitive
     colors: Float32Array | None = None
+    opacities: Float32Array | None = None
     if primitive.colors is not None:
         colors = np.tile(primitive.colors[:, :3], (piece.copies, 1))
+        if (primitive.colors[:, 3] < 1).any():
+            opacities = np.tile(primitive.colors[:, 3], piece.copies)
     return Part(
         vertices=there.vertices,
         triangles=placed_triangles(piece, mirrored),
@@ -208,6 +211,7 @@ def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
         uv=_v_up(primitive.uv[0], piece.copies),
         uv1=_v_up(primitive.uv[1], piece.copies),
         material=gltf.materials[primitive.material].name,
+        opacities=opacities,
     )
 
 
@@ -224,6 +228,10 @@ def surface_of(material: Material, gltf: Gltf | None = None) -> Surface:
         roughness=material.roughness,
         emission=(0.0, 0.0, 0.0) if material.unlit else material.emission,
         unlit=material.unlit,
+        opacity=material.color[3],
+        alpha=material.alpha_mode.lower(),
+        cutoff=material.cutoff,
+        double_sided=material.double_sided,
         textures=() if gltf is None else tuple(_textures(gltf, material)),
     )
 

@@ -124,6 +124,8 @@ def surface_of(material: MeshMaterial | None, *, colored: bool) -> Surface:
         "roughness": material.roughness,
         "metallic": material.metallic,
     }
+    if material.opacity is not None and material.opacity < 1:
+        keys |= {"opacity": min(max(material.opacity, 0.0), 1.0), "alpha": "blend"}
     if material.shininess is not None and material.roughness is None:
         # Blinn's exponent to GGX's alpha, 2/(Ns + 2) = alpha², alpha = roughness².
         keys["roughness"] = (2 / (max(material.shininess, 0.0) + 2)) ** 0.25

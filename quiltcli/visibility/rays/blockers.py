@@ -91,7 +91,11 @@ def _made(scene: Scene) -> Blockers:
         np.maximum(far, reach.take(triangles[:, k]), out=far)
     cast = np.ones(len(scene.objects), dtype=np.bool_)
     cast[list(scene.lets_light_by)] = False
-    chosen: IntArray = np.flatnonzero(cast.take(scene.object))
+    blocks = cast.take(scene.object)
+    for passed in (scene.soft, scene.invisible):  # what light may pass is not asked how much
+        if passed is not None:
+            blocks &= ~passed
+    chosen: IntArray = np.flatnonzero(blocks)
     shown = triangles if chosen.size == len(triangles) else triangles.take(chosen, axis=0)
     bent = np.asarray(scene.corner_normals[:, 3:9].any(axis=1))
     return Blockers(middle, embree_scene(corners, shown), far * ABOVE, bent)

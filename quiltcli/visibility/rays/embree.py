@@ -43,7 +43,15 @@ class Target:
     named: IntArray
 
 
-def aim(vertices: FloatArray, triangles: Int32Array, viewer: Viewer, backface_culling: bool) -> Target:
+def aim(
+    vertices: FloatArray,
+    triangles: Int32Array,
+    viewer: Viewer,
+    backface_culling: bool,
+    *,
+    one_sided: BoolArray | None = None,
+    invisible: BoolArray | None = None,
+) -> Target:
     """Make a target of a scene.
 
     Args:
@@ -51,6 +59,8 @@ def aim(vertices: FloatArray, triangles: Int32Array, viewer: Viewer, backface_cu
         triangles: (T, 3).
         viewer: the viewer.
         backface_culling: leave out triangles whose winding is clockwise as seen from the eye.
+        one_sided: (T,) the only ones that are left out then, without `backface_culling`; None for none.
+        invisible: (T,) triangles that hold up no light; None for none.
 
     Raises:
         MissingExtraError: there is no Embree on this machine.
@@ -62,6 +72,10 @@ def aim(vertices: FloatArray, triangles: Int32Array, viewer: Viewer, backface_cu
     drawn = np.asarray(normal.any(axis=1))
     if backface_culling:
         drawn &= offset < 0
+    elif one_sided is not None:
+        drawn &= ~one_sided | (offset < 0)
+    if invisible is not None:
+        drawn &= ~invisible
     farthest = viewer.reach_of(corners.T)[triangles].max(axis=1)
     # What ends before near begins would only have to be stepped through.
     named = np.flatnonzero(drawn & (farthest >= viewer.near * (1 - 1e-6)))

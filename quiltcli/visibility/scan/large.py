@@ -133,7 +133,7 @@ def _draw_rounds(
         for part in slices(first, last, _ROUND):
             few = spans[part]
             keys = canvas.keys.take(few.tile, axis=0)
-            canvas.keys[few.tile] = np.maximum(keys, _tile_keys(planes, few, limits, bits, by), out=keys)
+            canvas.keys[few.tile] = np.maximum(keys, tile_keys(planes, few, limits, bits, by), out=keys)
 
 
 def _rounds(spans: Spans) -> tuple[IntArray, IntArray]:
@@ -160,9 +160,7 @@ def _sorted_order(values: IntArray) -> IntArray:
     return packed
 
 
-def _tile_keys(
-    planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None
-) -> IntArray:
+def tile_keys(planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None) -> IntArray:
     """Keys (S, 64) of some microtiles; negative where they are not covered."""
     row, x, y = spans.row, spans.x, spans.y
     crossed = int(np.bitwise_or.reduce(spans.crossed))

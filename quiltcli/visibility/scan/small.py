@@ -8,6 +8,8 @@ microtiles under their boxes tells, before their planes are made.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,8 @@ from quiltcli.visibility.setup.planes import Planes, PlaneTable, Warped, depth_b
 
 SIZES = (2, 3, 4, 6, 8, 12)
 LIMIT = SIZES[-1]
+Candidates: TypeAlias = tuple[IntArray, IntArray]
+"""Addresses and depth keys of fragments."""
 _RUN = 1 << 16
 _CANDIDATES = 1 << 16
 _SHAPES = len(SIZES) ** 2
@@ -104,6 +108,25 @@ def draw_small(
     return candidates + _draw(pairs, back, table, canvas, limits, bits, by)
 
 
+def candidates_of(
+    pairs: Warped,
+    rows: IntArray,
+    table: PlaneTable,
+    canvas: Canvas,
+    limits: DepthRange,
+    bits: int,
+    by: BatchOrder | None,
+) -> list[Candidates]:
+    """Addresses and keys of all fragments of pairs that lie before what is drawn; the canvas stays as it is.
+
+    Arguments as for `draw_small`.
+    """
+    found: list[Candidates] = []
+    if rows.size:
+        _draw(pairs, rows, table, canvas, limits, bits, by, found)
+    return found
+
+
 def _draw(
     pairs: Warped,
     rows: IntArray,
@@ -112,14 +135,15 @@ def _draw(
     limits: DepthRange,
     bits: int,
     by: BatchOrder | None,
+    into: list[Candidates] | None = None,
 ) -> int:
-    """Draw pairs by classes; the number of candidate pixels."""
+    """Draw pairs by classes, or gather their fragments; the number of candidate pixels."""
     classes = size_classes(pairs, rows)
     order = np.argsort(classes, kind="stable")
     candidates = 0
     for part in slices(0, order.size, _RUN):
         run = order[part]
-        candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by)
+        candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by, into)
     return candidates
 
 
@@ -153,6 +177,7 @@ def _draw_run(
     limits: DepthRange,
     bits: int,
     by: BatchOrder | None,
+    into: list[Candidates] | None,
 ) -> int:
     """Draw pairs sorted by class (N,); the number of candidate pixels."""
     bounds = np.flatnonzero(np.diff(classes, prepend=np.uint16(65535), append=np.uint16(65535)))
@@ -162,7 +187,7 @@ def _draw_run(
         height, width = SIZES[shape // len(SIZES)], SIZES[shape % len(SIZES)]
         candidates += (last - first) * width * height
         for part in slices(first, last, _CANDIDATES // (width * height)):
-            _draw_boxes(planes[part], (height, width), canvas, limits if cut else None, bits, by)
+            _draw_boxes(planes[part], (height, width), canvas, limits if cut else None, bits, by, into)
     return candidates
 
 
@@ -173,8 +198,9 @@ def _draw_boxes(
     limits: DepthRange | None,
     bits: int,
     by: BatchOrder | None,
+    into: list[Candidates] | None,
 ) -> None:
-    """Draw pairs whose boxes all have this (height, width)."""
+    """Draw pairs whose boxes all have this (height, width), or gather their fragments."""
     height, width = shape
     block = planes.block
     # Numbers of 32 bits are enough for addresses in a batch, and half the memory.
@@ -202,6 +228,10 @@ def _draw_boxes(
     row = (y >> 3) * (across * 64) + (y & 7) * 8 + start * 64
     address = (row[:, None, :] + column).ravel().take(drawn).astype(np.int64)
     keys = make_keys(serial_part(planes.serial, bits), bits, out=inverse).ravel().take(drawn)
+    if into is not None:
+        front = keys > np.maximum(canvas.keys.reshape(-1).take(address), 0)
+        into.append((address[front], keys[front]))
+        return
     np.maximum.at(canvas.keys.reshape(-1), address, keys)
     canvas.touched[address >> 6] = True
 

@@ -81,15 +81,16 @@ class Spans:
         return Spans(*(column.take(keep) for column in vars(self).values()))
 
 
-def large_spans(planes: Planes, canvas: Canvas, by: BatchOrder | None = None) -> Spans:
+def large_spans(planes: Planes, canvas: Canvas, by: BatchOrder | None = None, *, hide: bool = True) -> Spans:
     """The microtiles that pairs of any size may show in.
 
     Args:
         planes: the pairs.
         canvas: the microtiles.
         by: what to order by instead of 1/t; tiles of pairs that lie behind others are not left out then.
+        hide: whether those are left out otherwise.
     """
-    return _spans(planes, _pieces(planes, by is None), canvas)
+    return _spans(planes, _pieces(planes, hide and by is None), canvas)
 
 
 def _pieces(planes: Planes, hide: bool) -> Pieces:

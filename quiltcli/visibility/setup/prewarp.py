@@ -31,12 +31,14 @@ class Sight:
         triangles: (T, 3).
         cut: (T,) triangles that reach beyond the near or far depth.
         culled: whether triangles that face away have been left out.
+        soft: (T,) triangles that light may pass; None where there are none.
     """
 
     vertices: FloatArray
     triangles: Int32Array
     cut: BoolArray
     culled: bool = False
+    soft: BoolArray | None = None
 
 
 @dataclass(frozen=True)
