@@ -48,6 +48,9 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(DOCS)/sphere_aside.png --size 960x720 --supersample 3 --from 0.9,0.6,1.0 --edges
 	$(QUILT) simulate scenes/demo.yaml -f 4 -o $(DOCS)/box_third.png --size 960x600 --supersample 3 --third-person
 	$(QUILT) simulate scenes/demo_stereo.yaml -f 6 -o $(DOCS)/stereo-glasses.png --size 720x540 --supersample 3 --glasses half-color
+	$(QUILT) simulate scenes/show_box.yaml -f 9 -o $(DOCS)/show_box.png --size 960x720 --supersample 2
+	$(QUILT) simulate scenes/show_sphere.yaml -f 15 -o $(DOCS)/show_sphere.png --size 960x720 --supersample 2
+	$(QUILT) simulate scenes/show_corner.yaml -f 12 -o $(DOCS)/show_corner.png --size 960x720 --supersample 2
 	$(QUILT) render scenes/demo.yaml -f 6 --overwrite
 	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(DOCS)/box_quilt.png
 	$(QUILT) simulate scenes/demo_hall.yaml -f 1 -o $(DOCS)/textures.png --size 720x480 --supersample 3
@@ -69,7 +72,7 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/channels.py out/demo/facets/facet_0001.0003.exr -o $(DOCS)/channels.png
 	$(PY) docs/pictures/motion_blur.py -o $(DOCS)/motion-blur.png
 	$(PY) docs/pictures/transparency.py -o $(DOCS)/transparency.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png $(DOCS)/show_*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2

@@ -194,6 +194,48 @@ def plate() -> Mesh:
     return mesh
 
 
+def mosaic() -> CoveredMesh:
+    """A round floor 1 m wide at height 0, one polygon; a picture lies on it as seen from above."""
+    mesh = CoveredMesh()
+    turns = [2 * math.pi * k / 64 for k in range(64)]
+    places = [(0.5 * math.cos(t), 0.5 * math.sin(t)) for t in turns]
+    first = mesh.add_points([(x, 0, -y) for x, y in places])
+    mesh.faces.append(tuple(range(first, first + 64)))
+    mesh.places.append([(x + 0.5, y + 0.5) for x, y in places])
+    return mesh
+
+
+def pavilion() -> Mesh:
+    """Eight columns under a ring, on a round step below height 0; 1 m wide, 0.62 m high, for `mosaic`."""
+    mesh = Mesh()
+    paint(mesh, "chalk")
+    turn(mesh, [(0, -0.05), (0.49, -0.05), (0.5, -0.04), (0.5, 0)], 64)
+    column = [
+        (0.045, 0),
+        (0.045, 0.02),
+        (0.03, 0.03),
+        (0.024, 0.44),
+        (0.024, 0.46),
+        (0.042, 0.47),
+        (0.042, 0.49),
+    ]
+    for k in range(8):
+        angle = 2 * math.pi * (k + 0.5) / 8
+        turn(mesh, [(0, 0), *column, (0, 0.49)], 20, (0.43 * math.cos(angle), 0.43 * math.sin(angle)))
+    ring = [(0.37, 0.49), (0.49, 0.49), (0.49, 0.53), (0.5, 0.54), (0.5, 0.57), (0.38, 0.57), (0.37, 0.56)]
+    turn(mesh, [*ring, ring[0]], 64)
+    return mesh
+
+
+def turn(
+    mesh: Mesh, profile: list[tuple[float, float]], sides: int, at: tuple[float, float] = (0, 0)
+) -> None:
+    """Add what a profile makes around an upright axis at a place."""
+    part = revolved(profile, sides)
+    first = mesh.add_points([(x + at[0], y, z + at[1]) for x, y, z in part.vertices])
+    mesh.faces += [tuple(first + corner for corner in face) for face in part.faces]
+
+
 def room() -> Mesh:
     """A room of 6 m × 6 m, 3.2 m high, seen from inside: tiled floor, coloured walls, a beamed ceiling."""
     mesh = Mesh()
@@ -297,6 +339,8 @@ MESHES: dict[str, Callable[[], Mesh]] = {
     "board": board,
     "dish": dish,
     "plate": plate,
+    "mosaic": mosaic,
+    "pavilion": pavilion,
     "hall": hall,
     "room": room,
     "table": table,

@@ -54,6 +54,7 @@ from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
 from quiltcli.scene.textures.pool import check_textures
+from quiltcli.shading.lights import demand_shadows
 from quiltcli.viewer.clip import settled_clip, their_lit_facets
 from quiltcli.viewer.view import View, facet_problems, view_problems, viewers_of, views_of
 
@@ -136,6 +137,8 @@ class _Findings:
             if scene is not None:
                 drawn = (texture for textures in scene.materials.textures for texture in textures)
                 self.run(check_textures, drawn, texture_limits(job))
+            if scene is not None and job.render.shadows:
+                self.run(demand_shadows, scene)
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
         return scene, source

@@ -22,6 +22,7 @@ from quiltcli.job.layout import (
 )
 from quiltcli.job.lengths import UNITS
 from quiltcli.job.lightfield import LightfieldFile
+from quiltcli.job.lights import AmbientLight, AreaLight, DirectionalLight, LightSpec, PointLight, SpotLight
 from quiltcli.job.load import (
     file_kind,
     load_calibration_file,
@@ -33,15 +34,7 @@ from quiltcli.job.load import (
     pack_spec,
 )
 from quiltcli.job.recorded import FilterSpec, GapsSpec, MarkerSpec, RecordedSpec
-from quiltcli.job.scene import (
-    AmbientLight,
-    DirectionalLight,
-    LightSpec,
-    MaterialSpec,
-    ObjectSpec,
-    PointLight,
-    SceneFile,
-)
+from quiltcli.job.scene import MaterialSpec, ObjectSpec, SceneFile
 from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, ViewerSpec
 
 __all__ = [
@@ -50,6 +43,7 @@ __all__ = [
     "PACKING_METHODS",
     "UNITS",
     "AmbientLight",
+    "AreaLight",
     "CalibrationFile",
     "CsvSpec",
     "DirectionalLight",
@@ -77,6 +71,7 @@ __all__ = [
     "RenderSpec",
     "ResolutionSpec",
     "SceneFile",
+    "SpotLight",
     "TransformSpec",
     "UvLayoutSpec",
     "ViewerSpec",

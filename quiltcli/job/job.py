@@ -24,6 +24,7 @@ from quiltcli.channels import CHANNELS
 from quiltcli.errors import JobError
 from quiltcli.job.halftone import HalftoneSpec
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
+from quiltcli.job.lights import MOST_RAYS
 from quiltcli.job.model import (
     YAMLS,
     AnyPath,
@@ -134,6 +135,15 @@ def _bits(value: Any) -> Any:
     raise complaint(f"expected {either(DEPTH_BITS)}, or no such key, got {describe(value)}")
 
 
+class OcclusionSpec(Model):
+    """What keeps light from places that comes from everywhere."""
+
+    distance: Positive
+    """How far off it may stand, metres."""
+    samples: Annotated[int, Field(ge=1, le=MOST_RAYS)] = 32
+    """Directions in which it is looked for from a pixel; those below the horizon are not."""
+
+
 class RenderSpec(Model):
     """How pixels are made."""
 
@@ -160,6 +170,10 @@ class RenderSpec(Model):
     """Drop triangles that face away from the viewer."""
     faces: Annotated[int, Field(ge=1, le=16384)] | None = None
     """Width and height of the faces that method: cubemap looks pixels up in, 2048 when absent, pixels."""
+    shadows: bool = True
+    """Draw the shadows of lights that have them."""
+    ambient_occlusion: OcclusionSpec | None = None
+    """Darken places by what is near them, in light from everywhere that has no shadows."""
     double_sided: Annotated[str, OneOf(SIDES)] = "all"
     """Surfaces whose backs are seen: all, or those that their files call so (file)."""
     threshold: Annotated[float, Field(ge=1e-4, le=1)] | None = None

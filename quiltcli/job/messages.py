@@ -54,6 +54,9 @@ def _unknown(key: Key, siblings: Sequence[type[BaseModel]], root: type[BaseModel
         return "unknown key (name the schema in a first line '# yaml-language-server: $schema=FILE')"
     names = [field.alias or name for model in siblings for name, field in model.model_fields.items()]
     elsewhere = [path for path in _all_keys(root) if path.rpartition(".")[2] == key[-1]]
+    # What is part of a part of another key's is meant less often.
+    least = min((path.count(".") for path in elsewhere), default=0)
+    elsewhere = [path for path in elsewhere if path.count(".") <= max(least, 1)]
     if len(elsewhere) == 1:
         return f"unknown key here (did you mean {elsewhere[0]!r}?)"
     near = suggest(key[-1], names)

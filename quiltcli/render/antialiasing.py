@@ -28,6 +28,7 @@ from quiltcli.render.sums import Sums, new_sums
 from quiltcli.shading.aovs import shaded_for, wanted_for
 from quiltcli.shading.layers import layers
 from quiltcli.shading.once import may_be_once, shaded_once
+from quiltcli.shading.shadows import Sample
 from quiltcli.visibility.draw import Cells, Frame, draw
 
 _WORTH_SETTLING = 3  # samples; fewer are looked at faster one by one
@@ -87,18 +88,19 @@ def add_samples(
         sums: added to.
         places: the samples' places in a pixel, from its centre.
     """
-    scene, wanted = stage.scene, wanted_for(sums.channels, stage.scene)
+    scene, wanted, count = stage.scene, wanted_for(sums.channels, stage.scene), stage.job.render.samples
     done = None
     if len(places) >= _WORTH_SETTLING and frame.order is None and may_be_once(scene):
         done = _add_settled(stage, frame, batch, sums, len(places))
     for place in places:
+        sample = Sample(sample_places(count).index(place), count)
         cells = None
         if scene.textures is not None:
-            cells = cells_in_quilt(stage.layout, *cell_of(place, stage.job.render.samples))
+            cells = cells_in_quilt(stage.layout, *cell_of(place, count))
         drawing = draw(frame, batch, in_quilt(stage.layout, place), cells, done=done)
-        for shaded in shaded_for(sums.channels, drawing, wanted, scene, frame.viewer.eye):
+        for shaded in shaded_for(sums.channels, drawing, wanted, scene, frame.viewer.eye, sample):
             sums.add(shaded)
-        for layer in layers(drawing, wanted, scene, frame.viewer.eye):
+        for layer in layers(drawing, wanted, scene, frame.viewer.eye, sample):
             sums.add(layer.shaded, layer.weight)
         drawing.done()
 

@@ -13,7 +13,7 @@ from quiltcli.display import Facets, load_display, scaled
 from quiltcli.errors import JobError, Problem, SceneError, raise_all
 from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.images.names import Names, layout_path, names_of, names_problems
-from quiltcli.job import JobFile, PackSpec, UvLayoutSpec, load_display_file, load_scene_file
+from quiltcli.job import JobFile, PackSpec, SceneFile, UvLayoutSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
 from quiltcli.projection.patches import Patches, patched
@@ -23,6 +23,7 @@ from quiltcli.scene import Scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
 from quiltcli.scene.textures.pool import TextureLimits, TextureStore
+from quiltcli.shading.lights import demand_shadows
 from quiltcli.viewer.clip import settled_clip
 from quiltcli.viewer.view import View, facet_problems, views_of
 from quiltcli.viewer.viewer import Viewer
@@ -99,7 +100,8 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
         folder: output folder instead of the job's; the layout of an earlier run is kept there.
 
     Raises:
-        QuiltError: a file is wrong, or the layout does not belong to the display.
+        QuiltError: a file is wrong, the layout does not belong to the display, or there is no Embree for
+            shadows.
     """
     kept = layout_path(folder or job.output.directory)
     facets, choice = facets_and_layout(job)
@@ -108,11 +110,21 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     raise_all(JobError, names_problems(job, len(layout.pages), facets.count))
     demand_memory(job, layout)
     store = TextureStore(texture_limits(job))
-    scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps), store)
+    scene, source = load_moving_scene(scene_spec(job), float(job.fps), store)
     if facets.charts and scene.soft is not None:
         words = "has surfaces that light passes, which curved facets do not show yet (expected opaque ones)"
         raise SceneError(Problem(words, file=str(job.scene)))
+    demand_shadows(scene)
     return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)
+
+
+def scene_spec(job: JobFile) -> SceneFile:
+    """The scene file of a job, as the job wants it drawn."""
+    spec = load_scene_file(job.scene)
+    near = job.render.ambient_occlusion
+    if not job.render.shadows:
+        spec = spec.without_shadows()
+    return spec if near is None else spec.with_ambient_occlusion(near.distance, near.samples)
 
 
 def texture_limits(job: JobFile) -> TextureLimits:

@@ -48,6 +48,7 @@ from quiltcli.render.shared import SharedArrays
 from quiltcli.render.sums import Sums, new_sums, summed
 from quiltcli.render.workplace import Fault, Item, Moved, Task, Workplace, serve
 from quiltcli.scene.textures.tangents import tangents_of
+from quiltcli.shading.lights import prepare_shadows
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import (
@@ -150,6 +151,7 @@ class Pool:
         tangents_of(stage.scene)
         if stage.job.render.backface_culling:
             _ = stage.scene.facing
+        prepare_shadows(stage.scene)
         self._workers: list[_Worker] = []
         self._known: list[set[int]] = [set() for _ in range(workers)]
         # Python waits at its end for children that are left, and these are deaf to its signal to end.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,14 +15,15 @@ from quiltcli.geometry import Float32Array
 from quiltcli.scene.bake import Baked, given_opacities, given_uv
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.gltf import FileLight, GltfModel, Playing, contested_channels
-from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point
+from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point, spot
 from quiltcli.scene.materials import Surface, material_table
 from quiltcli.scene.objects import Brought, ObjectError, SceneObject, bring, load_object
 from quiltcli.scene.scene import Scene
 from quiltcli.scene.textures.notices import textures_not_drawn, textures_without_places
 
 if TYPE_CHECKING:
-    from quiltcli.job.scene import LightSpec, ObjectSpec, SceneFile
+    from quiltcli.job.lights import LightSpec
+    from quiltcli.job.scene import ObjectSpec, SceneFile
 
 Color = tuple[float, float, float]
 
@@ -111,12 +112,6 @@ class _Gathered:
             words = f"{counted(len(lights), 'light')} of the file left out ('lights: file' takes them)"
             self.notices.append(f"{name}: {words}")
             return
-        spots = sum(light.kind == "spot" for light in lights)
-        limited = sum(light.limited for light in lights if light.kind != "spot")
-        if spots:
-            self.notices.append(f"{name}: {counted(spots, 'spot light')} of the file left out")
-        if limited:
-            self.notices.append(f"{name}: the range of {counted(limited, 'light')} is not kept to")
         self.lights += lights
 
 
@@ -155,7 +150,8 @@ def scene_of(spec: SceneFile, objects: Sequence[SceneObject], brought: Sequence[
     for index, (one, given) in enumerate(zip(objects, brought, strict=True)):
         gathered.take(one.name, given, one.playing)
         gathered.notices += _bright(index, spec.objects[index])
-    return _assembled(gathered, spec.lights, spec.background)
+    thin = tuple(index for index, item in enumerate(spec.objects) if not item.casts_shadows)
+    return replace(_assembled(gathered, spec.lights, spec.background), lets_light_by=thin)
 
 
 def wants_lights(spec: SceneFile) -> bool:
@@ -221,7 +217,7 @@ def _notices(gathered: _Gathered, lights: Sequence[LightSpec]) -> tuple[str, ...
 
 def _has_lamps(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> bool:
     """Whether anything lights the scene."""
-    return any(light.type != "file" for light in lights) or any(light.kind != "spot" for light in found)
+    return any(light.type != "file" for light in lights) or bool(found)
 
 
 def lights_in(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> tuple[Light, ...]:
@@ -229,12 +225,18 @@ def lights_in(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> tuple[
     if not _has_lamps(lights, found):
         return default_lights()
     scale = sum(light.scale for light in lights if light.type == "file")
+    shadows = any(light.shadows for light in lights if light.type == "file")
     own = [light for light in lights if light.type != "file"]
     rows = list(lights_of(own)) if own else []
-    for light in found:
-        color = [scale * part for part in light.color]
-        if light.kind == "directional":
-            rows.append(directional(light.direction, color))
-        elif light.kind == "point":
-            rows.append(point(light.position, color))
+    rows += [_lamp(light, scale, shadows=shadows) for light in found]
     return tuple(rows)
+
+
+def _lamp(light: FileLight, scale: float, *, shadows: bool) -> Light:
+    """A light of a mesh file."""
+    color = [scale * part for part in light.color]
+    if light.kind == "directional":
+        return directional(light.direction, color, shadows=shadows)
+    if light.kind == "point":
+        return point(light.position, color, light.reach, shadows=shadows)
+    return spot(light.position, light.direction, color, light.cone, light.reach, shadows=shadows)

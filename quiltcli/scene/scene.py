@@ -73,6 +73,7 @@ class Scene:
         notices: sentences to tell the user once: what was dropped or assumed.
         uv: (V, 2) texture coordinates, v up, NaN where there are none; None when there are none at all.
         coverage: how the areas of the files' polygons compare with those of their triangles.
+        lets_light_by: objects that cast no shadows, indices into `objects`.
         material_names: what materials are called, for mattes.
         material_name: (T,) index into `material_names`; None for the first everywhere.
         corner_motion: (T, 9) float32, how the first corner moves until the next frame, and what to add to
@@ -97,6 +98,7 @@ class Scene:
     notices: tuple[str, ...]
     uv: FloatArray | None = None
     coverage: Coverage = NOTHING
+    lets_light_by: tuple[int, ...] = ()
     material_names: tuple[str, ...] = ("",)
     material_name: Int32Array | None = None
     corner_motion: Float32Array | None = None

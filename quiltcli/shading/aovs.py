@@ -25,6 +25,7 @@ from quiltcli.shading.mattes import identities_of
 from quiltcli.shading.motion import motion, motion_wants
 from quiltcli.shading.nodes import NodeColors
 from quiltcli.shading.shade import Shades, shading_wants
+from quiltcli.shading.shadows import CENTRE, Sample
 from quiltcli.shading.surface import shading_normals
 from quiltcli.shading.textures.covers import UNLIT
 from quiltcli.viewer.viewer import Viewer
@@ -164,7 +165,12 @@ def wanted_for(names: Iterable[str], scene: Scene) -> Wanted:
 
 
 def shaded_for(
-    names: Iterable[str], drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray
+    names: Iterable[str],
+    drawing: Drawing,
+    wanted: Wanted,
+    scene: Scene,
+    eye: FloatArray,
+    sample: Sample = CENTRE,
 ) -> Iterator[Shaded]:
     """All that is seen of a drawing, as these channels are made of it fastest.
 
@@ -174,9 +180,10 @@ def shaded_for(
         wanted: what the hits shall tell, `wanted_for` the channels at least.
         scene: what was drawn.
         eye: (3,) from where it is seen.
+        sample: which sample of its pixels was drawn.
     """
     if any(SOURCES[name].light for name in names):
-        return shaded(drawing.regions(wanted, scene), scene, eye)
+        return shaded(drawing.regions(wanted, scene), scene, eye, sample)
     return (Shaded(scene, eye, hits) for hits in drawing.hits(wanted, scene))
 
 

@@ -16,6 +16,7 @@ from quiltcli.scene import Scene
 from quiltcli.scene.scene import ALPHAS
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.materials import albedo_wants, alpha_at, at_materials
+from quiltcli.shading.shadows import CENTRE, Sample
 from quiltcli.visibility.draw import Drawing, Wanted
 from quiltcli.visibility.resolve.hits import Points
 
@@ -65,7 +66,9 @@ def opacity_wants(scene: Scene) -> Wanted:
     return wanted | albedo_wants(scene)
 
 
-def layers(drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray) -> Iterator[Layer]:
+def layers(
+    drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray, sample: Sample = CENTRE
+) -> Iterator[Layer]:
     """What of a drawing is seen through something, from the front to the back.
 
     Args:
@@ -73,6 +76,7 @@ def layers(drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray) -> I
         wanted: what the hits shall tell.
         scene: what was drawn.
         eye: (3,) from where it is seen.
+        sample: which sample of its pixels was drawn.
     """
     if drawing.soft is None:
         return
@@ -85,6 +89,6 @@ def layers(drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray) -> I
         some = opacity > 0
         first = some & ~seen.take(one.row)
         seen[one.row] |= some
-        yield Layer(Shaded(scene, eye, one.hits), through * opacity, first, one.inside)
+        yield Layer(Shaded(scene, eye, one.hits, sample=sample), through * opacity, first, one.inside)
         passed[one.row] = through * (_ONE - opacity)
         light[one.row] = passed.take(one.row) > 0

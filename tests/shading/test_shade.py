@@ -11,7 +11,6 @@ import pytest
 from quiltcli.geometry import normalized
 from quiltcli.scene import Materials
 from quiltcli.scene.lights import HEADLIGHT
-from quiltcli.shading import lights as arriving
 from quiltcli.shading import shade as shading
 from quiltcli.shading.brdf import LEAST_ROUGHNESS
 from quiltcli.shading.materials import albedo_at
@@ -277,13 +276,3 @@ def test_each_lamp_adds_to_the_part_it_belongs_to():
     assert diffuse[:, 0] == pytest.approx([2 * 0.96 / math.pi] * 3, rel=1e-6)
     assert specular[:, 0] == pytest.approx([2 * 0.04 / (4 * math.pi)] * 3, rel=1e-6)
     assert not emission.any()
-
-
-def test_what_hides_a_lamp_takes_its_light_away_and_no_others(monkeypatch):
-    sun, lamp = lights([[0, 0, -1]], [[2, 2, 2]]), lights(point=[[0, 0, 1]], power=[[3, 3, 3]])
-    half = np.float32([[0.5]])
-    monkeypatch.setattr(arriving, "occlusion", lambda light, _: half if light.kind == "point" else None)
-    both, alone = (shade(wall(lamps), EYE, STRAIGHT) for lamps in (sun + lamp, sun))
-    monkeypatch.undo()
-    expected = alone + shade(wall(lamp), EYE, STRAIGHT) / 2
-    np.testing.assert_allclose(both, expected, rtol=1e-6)

@@ -258,7 +258,7 @@ CASES = [
     Case("scene: no objects", [put(SCENE, "quilt_scene: 1\nobjects: []\n")], [],
          "scene.yaml:2:10: objects: expected at least 1 item, got none"),
     Case("scene: light", [swap(SCENE, "directional", "directonal")], [],
-         "scene.yaml:5:10: lights[0].type: expected directional, point, ambient or file, got the text 'directonal' (did you mean 'directional'?)"),
+         "scene.yaml:5:10: lights[0].type: expected directional, point, spot, area, ambient, environment or file, got the text 'directonal' (did you mean 'directional'?)"),
     Case("scene: negative color", [swap(SCENE, "[0.8, 0.2, 0.1]", "[-0.8, 0.2, 0.1]")], [],
          "scene.yaml:3:51: objects[0].material.color[0]: must be at least 0, got -0.8"),
     Case("scene: direction", [swap(SCENE, "[-1, -2, -1]", "[0, 0, 0]")], [],

@@ -19,6 +19,7 @@ from quiltcli.charts.meet import meet, net
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot
 from quiltcli.projection.camera import raster_display
+from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background, new_buffers
 from quiltcli.render.frame import draw_frame
@@ -107,7 +108,12 @@ def draw_tessellated(
                 slopes=weight_slopes(target, triangle, matrix, ray, position) if sloped else None,
             )
             if seen.size:
-                fill(buffers, stage.job.output.channels, viewer, Shaded(stage.scene, viewer.eye, hits))
+                fill(
+                    buffers,
+                    stage.job.output.channels,
+                    Gaze(viewer, None),
+                    Shaded(stage.scene, viewer.eye, hits),
+                )
             visible += hits.inside
     return FrameRecord(
         frame=viewer.frame,

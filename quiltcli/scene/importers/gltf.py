@@ -99,17 +99,19 @@ class FileLight:
         position: metres; of no account for a directional light.
         direction: the way it shines, unit; of no account for a point light.
         color: irradiance of a directional light, radiant intensity of the others.
-        limited: whether the file says how far it shines.
+        reach: how far it shines, metres; infinite where the file says nothing.
+        cone: angles, radians, from a spot's direction to where it begins to fade and to where it is dark.
     """
 
     kind: str
     position: tuple[float, float, float]
     direction: tuple[float, float, float]
     color: tuple[float, float, float]
-    limited: bool
+    reach: float
+    cone: tuple[float, float]
 
     def placed(self, matrix: FloatArray) -> FileLight:
-        """The light moved by an affine (4, 4) matrix; its strength stays."""
+        """The light moved by an affine (4, 4) matrix; its strength, its range and its cone stay."""
         along = matrix[:3, :3] @ np.array(self.direction)
         return replace(
             self,
@@ -276,5 +278,6 @@ def _lights(gltf: Gltf, world: FloatArray) -> Iterator[FileLight]:
             position=_triple(place[:3, 3]),
             direction=_triple(normalized(-place[:3, 2])),
             color=(red, green, blue),
-            limited=bool(np.isfinite(light.reach)),
+            reach=light.reach,
+            cone=(light.inner, light.outer),
         )
