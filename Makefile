@@ -50,6 +50,7 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) simulate scenes/demo_stereo.yaml -f 6 -o $(DOCS)/stereo-glasses.png --size 720x540 --supersample 3 --glasses half-color
 	$(QUILT) render scenes/demo.yaml -f 6 --overwrite
 	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(DOCS)/box_quilt.png
+	$(QUILT) simulate scenes/demo_hall.yaml -f 1 -o $(DOCS)/textures.png --size 720x480 --supersample 3
 	$(QUILT) path scenes/demo_cave.yaml -o $(DOCS)/take.png
 	$(QUILT) simulate scenes/demo_cave.yaml -f 120 -o $(DOCS)/cave-take.png --size 960x600 --supersample 2 --third-person
 	mv $(DOCS)/cave-take.left.png $(DOCS)/cave-take.png && rm $(DOCS)/cave-take.right.png
@@ -62,7 +63,7 @@ pictures: env ## make the pictures of the README anew
 	rm -rf out/lab && $(QUILT) new cave -o out/lab --size 3x3x3m --pixels 512x512
 	$(QUILT) simulate out/lab/job.yaml -f 1 -o $(DOCS)/cave-lab.png --third-person --from 2.6,3.4,5.2 --size 640x400 --supersample 3
 	$(PY) docs/pictures/reduce.py $(DOCS)/wall-*.png $(DOCS)/cave-lab.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2

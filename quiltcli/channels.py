@@ -50,6 +50,7 @@ CHANNELS: Mapping[str, Channel] = MappingProxyType(
         "triangle": Channel(("triangle",), _UINT),
         "N": Channel(("N.X", "N.Y", "N.Z"), _HALF),
         "P": Channel(("P.X", "P.Y", "P.Z"), _FLOAT),
+        "uv": Channel(("uv.U", "uv.V"), _FLOAT),
         "albedo": Channel(("albedo.R", "albedo.G", "albedo.B"), _HALF, averaged=True),
         "diffuse": Channel(("diffuse.R", "diffuse.G", "diffuse.B"), _HALF, averaged=True),
         "specular": Channel(("specular.R", "specular.G", "specular.B"), _HALF, averaged=True),

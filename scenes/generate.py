@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,28 @@ PALETTE = {
     "clay": (0.46, 0.19, 0.105),
     "dusk": (0.085, 0.14, 0.25),
 }
+
+# Materials of pictures, which pictures.py draws.
+COVERED = {
+    "tiles": "map_Kd tiles.png\nPr 0.35\n",
+    "bricks": "map_Kd bricks.png\nnorm bricks_normal.png\nmap_Pr bricks_roughness.png\n",
+}
+SPAN = 1.5  # metres that a picture covers
+
+
+@dataclass
+class CoveredMesh(Mesh):
+    """A mesh with texture coordinates (u, v) of the corners of all faces."""
+
+    places: list[list[tuple[float, float]]] = field(default_factory=list)
+
+    def add_panel(self, corner: tuple[float, ...], right: tuple[float, ...], up: tuple[float, ...]) -> None:
+        """Add a rectangle from its lower left corner, seen from the front, covered to scale."""
+        o, r, u = (np.array(vector, dtype=np.float64) for vector in (corner, right, up))
+        first = self.add_points([o, o + r, o + r + u, o + u])
+        self.faces.append(tuple(range(first, first + 4)))
+        wide, high = float(np.linalg.norm(r)) / SPAN, float(np.linalg.norm(u)) / SPAN
+        self.places.append([(0, 0), (wide, 0), (wide, high), (0, high)])
 
 
 def teapot() -> Mesh:
@@ -198,6 +221,28 @@ def table() -> Mesh:
     return mesh
 
 
+def hall() -> CoveredMesh:
+    """A hall of 6 m × 6 m, 3.2 m high, seen from inside: tiles, brick walls and two brick pillars."""
+    mesh = CoveredMesh()
+    w, h = 3.0, 3.2
+    paint(mesh, "tiles")
+    mesh.add_panel((-w, 0, w), (2 * w, 0, 0), (0, 0, -2 * w))
+    paint(mesh, "bricks")
+    mesh.add_panel((-w, 0, -w), (2 * w, 0, 0), (0, h, 0))
+    mesh.add_panel((w, 0, -w), (0, 0, 2 * w), (0, h, 0))
+    mesh.add_panel((w, 0, w), (-2 * w, 0, 0), (0, h, 0))
+    mesh.add_panel((-w, 0, w), (0, 0, -2 * w), (0, h, 0))
+    for x, z, high in ((-1.6, -1.9, 2.4), (1.2, -1.6, 0.9)):
+        r = 0.3
+        sides = [(x - r, z + r, 1, 0), (x + r, z + r, 0, -1), (x + r, z - r, -1, 0), (x - r, z - r, 0, 1)]
+        for x0, z0, dx, dz in sides:
+            mesh.add_panel((x0, 0, z0), (2 * r * dx, 0, 2 * r * dz), (0, high, 0))
+        mesh.add_panel((x - r, high, z + r), (2 * r, 0, 0), (0, 0, -2 * r))
+    paint(mesh, "chalk")
+    mesh.add_panel((-w, h, -w), (2 * w, 0, 0), (0, 0, 2 * w))
+    return mesh
+
+
 MESHES: dict[str, Callable[[], Mesh]] = {
     "teapot": teapot,
     "knot": knot,
@@ -209,6 +254,7 @@ MESHES: dict[str, Callable[[], Mesh]] = {
     "board": board,
     "dish": dish,
     "plate": plate,
+    "hall": hall,
     "room": room,
     "table": table,
 }
@@ -221,19 +267,26 @@ def obj_text(name: str) -> str:
     if mesh.names:
         lines.append(f"mtllib {name}.mtl")
     lines += ["v " + " ".join(f"{round(c, 6) + 0.0:.6g}" for c in point) for point in mesh.vertices]
+    places = mesh.places if isinstance(mesh, CoveredMesh) else []
+    lines += [f"vt {round(u, 6):.6g} {round(v, 6):.6g}" for corners in places for u, v in corners]
     current = ""
     for index, face in enumerate(mesh.faces):
         if mesh.names.get(index, current) != current:
             current = mesh.names[index]
             lines.append(f"usemtl {current}")
-        lines.append("f " + " ".join(str(corner + 1) for corner in face))
+        corners = [str(corner + 1) for corner in face]
+        if places:
+            corners = [f"{corner}/{4 * index + k + 1}" for k, corner in enumerate(corners)]
+        lines.append("f " + " ".join(corners))
     return "\n".join(lines) + "\n"
 
 
 def mtl_text(name: str) -> str:
     """The materials a mesh uses, empty when it has none of its own."""
-    used = sorted(set(MESHES[name]().names.values()) & PALETTE.keys())
-    return "".join(f"newmtl {m}\nKd {' '.join(map(str, PALETTE[m]))}\nNs 30\n" for m in used)
+    names = set(MESHES[name]().names.values())
+    plain = sorted(names & PALETTE.keys())
+    text = "".join(f"newmtl {m}\nKd {' '.join(map(str, PALETTE[m]))}\nNs 30\n" for m in plain)
+    return text + "".join(f"newmtl {m}\nKd 1 1 1\n{COVERED[m]}" for m in sorted(names & COVERED.keys()))
 
 
 def write(folder: Path, names: Iterable[str]) -> None:

@@ -38,9 +38,10 @@ from quiltcli.layout import align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.render.needs import demand_memory
 from quiltcli.render.notices import job_warnings
-from quiltcli.render.setup import facets_and_layout
+from quiltcli.render.setup import facets_and_layout, texture_limits
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
+from quiltcli.scene.textures.pool import check_textures
 from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import facet_problems, view_problems, viewers_of
 
@@ -115,6 +116,9 @@ class _Findings:
         else:
             scene, source = self.run(load_moving_scene, spec, float(job.fps)) or (None, None)
             self.problems += source.problems(job.frames) if source is not None else ()
+            if scene is not None:
+                drawn = (texture for textures in scene.materials.textures for texture in textures)
+                self.run(check_textures, drawn, texture_limits(job))
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
         return scene

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from quiltcli.formats.gltf.container import files_beside
+from quiltcli.formats.mesh.mtl import read_mtl
 from quiltcli.formats.noted import note_digest, note_input, noted_digest
 from quiltcli.job.dump import plain
 from quiltcli.job.job import JobFile
@@ -18,6 +19,7 @@ from quiltcli.job.layout_table import places_sha256, read_layout_table
 from quiltcli.job.load import load_display_file, load_scene_file
 from quiltcli.job.model import YAMLS
 
+_HEAD = 1 << 16  # bytes of a PLY file that hold its header
 _PACKING = {"net": 2}
 """Raised from 1 where a method comes to another layout than before from the same wishes."""
 
@@ -43,7 +45,7 @@ def job_sha256(job: JobFile) -> str:
         del data["render"]["scale"]  # what there was before there was this key
     else:
         data["layout"] = "packed anew"
-    del data["frames"]
+    del data["frames"], data["render"]["texture_memory"]
     data["output"] = {key: data["output"][key] for key in ("channels", "compression", "data_window")}
     return _text_sha256(data)
 
@@ -114,12 +116,16 @@ def _drawn_in(path: Path) -> Iterator[Path]:
         for name in _named(path, rb"mtllib"):
             yield path.parent / name
             if (path.parent / name).is_file():
-                yield from (
-                    path.parent / picture for picture in _named(path.parent / name, rb"map_\w+|bump|norm")
-                )
+                materials = read_mtl(_bytes(path.parent / name), path.parent)
+                yield from (texture.path for found in materials.values() for texture in found.textures)
+    if suffix == ".ply":
+        yield from (path.parent / name for name in _named(path, rb"comment[ \t]+TextureFile", most=_HEAD))
 
 
-def _named(path: Path, words: bytes) -> Iterator[str]:
-    """Last word of every line that starts with one of some words."""
-    for match in re.finditer(rb"^[ \t]*(?:" + words + rb")[ \t]+(.*?)[ \t\r]*$", _bytes(path), re.MULTILINE):
-        yield match[1].split()[-1].decode("utf-8", "replace") if match[1].split() else ""
+def _named(path: Path, words: bytes, most: int | None = None) -> Iterator[str]:
+    """What stands behind words at the start of lines, among the first `most` bytes; and its last word."""
+    for match in re.finditer(
+        rb"^[ \t]*(?:" + words + rb")[ \t]+(.*?)[ \t\r]*$", _bytes(path)[:most], re.MULTILINE
+    ):
+        text = match[1].decode("utf-8", "replace")
+        yield from dict.fromkeys((text, text.split()[-1])) if text.split() else ()

@@ -48,6 +48,7 @@ STEREO = ("files", "parts")
 _NAME = re.compile(r"[\w-]+")
 MOST_SAMPLES = 4096
 MOST_BLEED = 4096
+MOST_PLACES = 64
 UNLIT = ("write", "link", "skip")
 DATA_WINDOWS = ("full", "tight")
 _FRACTION = re.compile(r"[-+]?\d{1,9}(\.\d{0,9}|/\d{1,9})?")
@@ -142,6 +143,12 @@ class RenderSpec(Model):
     """Drop triangles that face away from the viewer."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
+    anisotropy: Annotated[int, Field(ge=1, le=MOST_PLACES)] = 16
+    """Places of a texture that a pixel looks at, at most; more are sharper where surfaces are seen aslant."""
+    max_texture: Annotated[int, Field(ge=1, le=65536)] = 8192
+    """Largest side of a texture, pixels; larger pictures are reduced."""
+    texture_memory: Annotated[float, Field(gt=0, le=1_000_000)] = 4096.0
+    """Memory that all textures may take together, megabytes."""
 
     scale: Annotated[
         Fraction,

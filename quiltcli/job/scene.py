@@ -15,6 +15,7 @@ from quiltcli.job.lengths import UNITS, UpAxis, up_matrix
 from quiltcli.job.model import (
     Complaint,
     Direction,
+    ExistingFile,
     FileModel,
     Listed,
     Model,
@@ -23,6 +24,7 @@ from quiltcli.job.model import (
     OneOf,
     Rgb,
     Unit,
+    Vec2,
     Vec3,
     complaint,
     describe,
@@ -32,6 +34,49 @@ from quiltcli.job.model import (
 from quiltcli.job.placement import PlacementSpec
 from quiltcli.job.sequence import MeshOrSequence, MeshSequence, is_pattern
 from quiltcli.job.viewer import FrameRange
+
+Picture: TypeAlias = Annotated[Path, ExistingFile((), "a picture")]
+
+
+class TexturesSpec(Model):
+    """Pictures that vary a material, laid out by the mesh's texture coordinates."""
+
+    color: Picture | None = None
+    """Picture that base colours are multiplied with, in sRGB unless it is a float file."""
+    emission: Picture | None = None
+    """Picture of the light given off, likewise."""
+    metallic: Picture | None = None
+    """Picture of 0 to 1 for paint to metal, of which red counts."""
+    roughness: Picture | None = None
+    """Picture of 0 to 1 for a mirror to chalk, of which red counts."""
+    normal: Picture | None = None
+    """Normal map: red to the picture's right, green to its upper edge, blue out of the surface."""
+    occlusion: Picture | None = None
+    """Picture of how much of the ambient light arrives, of which red counts."""
+    scale: Vec2 = (1.0, 1.0)
+    """How many times the pictures are there in the mesh's texture coordinates from 0 to 1, along u and v."""
+    offset: Vec2 = (0.0, 0.0)
+    """Added to texture coordinates after that; v is up."""
+    wrap: Annotated[str, OneOf(("repeat", "clamp", "mirror"))] = "repeat"
+    """What is beyond a picture's edges: itself again, its edge, or its mirror image."""
+    uv_set: Annotated[int, Field(ge=0, le=1)] = 0
+    """Which of the mesh's texture coordinates, the number of the set."""
+    strength: Number = 1.0
+    """Strength of the normal map: how many times its slopes; 0 is flat."""
+
+    def pictures(self) -> dict[str, Path]:
+        """The pictures by what they vary."""
+        roles = ("color", "emission", "metallic", "roughness", "normal", "occlusion")
+        return {role: path for role in roles if (path := getattr(self, role)) is not None}
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """There is a picture."""
+        if not self.pictures():
+            yield (), "names no picture (expected color, emission, metallic, roughness, normal or occlusion)"
+
+
+_UNDER_PICTURES = {"color": (1.0, 1.0, 1.0), "emission": (1.0, 1.0, 1.0), "metallic": 1.0, "roughness": 1.0}
+"""What pictures of a scene file multiply unless it says something else."""
 
 
 class MaterialSpec(Model):
@@ -49,6 +94,14 @@ class MaterialSpec(Model):
     """Show exactly `color`, whatever the lights."""
     specular: Unit | None = None
     """1 for a surface that also reflects the lamps themselves, 0 for a matte one; metals always do."""
+    textures: TexturesSpec | None = None
+    """Pictures that vary the material; they multiply `color`, `emission`, `metallic` and `roughness`."""
+
+    def changes(self) -> dict[str, Any]:
+        """Values to change by name; under a picture they are 1 where nothing else is said."""
+        under = {} if self.textures is None else self.textures.pictures()
+        values = {key: value for key, value in _UNDER_PICTURES.items() if key in under}
+        return values | self.model_dump(exclude_none=True, exclude={"textures"})
 
 
 def _clip_names(value: Any) -> Any:

@@ -6,6 +6,9 @@ lattice, and the error at edges falls as the number to the power of −3/4, whic
 Samples are placed in the facet's own pixels: its image does not depend on how it is turned in the quilt.
 Past a facet's edge they see the plane go on, so its border pixels are those of a larger facet.
 
+Whether a sample sees a surface is decided at its place; textures are looked up in the middle of its cell,
+over the cell, so that the footprints of a pixel's samples tile it.
+
 Sums are kept for the pixels of a batch, whatever the number of samples: memory does not grow with it. Depth,
 ids and other data are those of the pixel's centre.
 """
@@ -22,8 +25,9 @@ from quiltcli.layout import Layout
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.setup import Stage
 from quiltcli.shading.aovs import light_at_points, shaded_for, wanted_for
-from quiltcli.visibility.draw import Frame, draw
+from quiltcli.visibility.draw import Cells, Frame, draw
 
+_LONGEST = 5  # times as wide as high a cell's grid may be
 _TURN = 1e-6  # by which a map's linear part may be off a whole turn
 _LATTICES = {
     2: 1,
@@ -71,7 +75,10 @@ def draw_samples(
     scene, eye = stage.scene, frame.viewer.eye
     count = stage.job.render.samples
     for sample in sample_places(count):
-        drawing = draw(frame, batch, in_quilt(stage.layout, sample))
+        place, cells = in_quilt(stage.layout, sample), None
+        if scene.textures is not None:
+            cells = cells_in_quilt(stage.layout, *cell_of(sample, count))
+        drawing = draw(frame, batch, place, cells)
         for shaded in shaded_for(channels, drawing, wanted_for(channels, scene), scene, eye):
             pixel = shaded.hits.pixel - sums.first
             sums.hits[pixel] += 1
@@ -119,11 +126,49 @@ def in_quilt(layout: Layout, sample: tuple[float, float]) -> FloatArray:
 
     Where a facet is not moved by whole pixels its pixels are not the quilt's, and the place is the quilt's.
     """
+    return np.asarray(_turns(layout) @ np.array(sample))
+
+
+def cells_in_quilt(layout: Layout, offset: tuple[float, float], size: tuple[float, float]) -> Cells:
+    """A cell of facets' pixels, by its way from the sample and its size, turned as facets are."""
+    turns = _turns(layout)
+    return Cells(np.asarray(turns @ np.array(offset)), np.asarray(np.abs(turns) @ np.array(size)))
+
+
+def _turns(layout: Layout) -> FloatArray:
+    """How facets' pixels (F, 2, 2) are turned in the quilt."""
     linear = layout.quilt_from_facet[:, :, :2]
     whole = np.rint(linear)
     turned = (np.abs(linear - whole).max(axis=(1, 2)) < _TURN) & (np.abs(whole).sum(axis=(1, 2)) == 2)
-    turn = np.where(turned[:, None, None], whole, np.eye(2))
-    return np.asarray(turn @ np.array(sample))
+    return np.where(turned[:, None, None], whole, np.eye(2))
+
+
+def cell_of(sample: tuple[float, float], count: int) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The part of a pixel that one of `count` samples stands for: its middle from the sample, its size.
+
+    Cells of a grid tile the pixel. Where the lattice has no grid, it is as large a square at the sample.
+    """
+    across, down = cell_grid(count)
+    if not across:
+        side = count**-0.5
+        return (0.0, 0.0), (side, side)
+    x, y = (
+        (np.floor((place + 0.5) * cells) + 0.5) / cells - 0.5 - place
+        for place, cells in zip(sample, (across, down), strict=True)
+    )
+    return (float(x), float(y)), (1 / across, 1 / down)
+
+
+@lru_cache(maxsize=8)
+def cell_grid(count: int) -> tuple[int, int]:
+    """Cells across and down of the grid with one sample in each, as square as there is one; 0 without any."""
+    places = np.array(sample_places(count)) + 0.5
+    for down in range(int(count**0.5), 0, -1):
+        across = count // down
+        cells = np.floor(places * (across, down)) @ (1, across)
+        if across * down == count and np.unique(cells).size == count and across <= _LONGEST * down:
+            return across, down
+    return 0, 0
 
 
 @lru_cache(maxsize=8)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.render.shared import SharedArrays
-from quiltcli.scene import Scene
+from quiltcli.scene import Materials, Scene
 from quiltcli.scene.scene import corner_normals_of, facing_anywhere, planes_of
 from quiltcli.visibility.draw import BlockPairs
 from quiltcli.visibility.shares import Seen
@@ -89,6 +89,8 @@ def share_scene(arrays: SharedArrays, old: Scene, new: Scene) -> tuple[dict[str,
         if isinstance(value, np.ndarray) and value.ndim:
             arrays.put(f"scene.{field.name}", value)
             shared.append(f"scene.{field.name}")
+        elif isinstance(value, Materials):
+            plain[field.name] = replace(value, textures=())  # pictures are in the scene's textures by now
         else:
             plain[field.name] = value
     count = len(new.triangles)

@@ -20,6 +20,7 @@ from quiltcli.render.needs import demand_memory
 from quiltcli.scene import Scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
+from quiltcli.scene.textures.pool import TextureLimits, TextureStore
 from quiltcli.viewer.clip import settled_clip
 from quiltcli.viewer.view import View, facet_problems, views_of
 from quiltcli.visibility.binning.pairs import Parts, facet_parts
@@ -95,8 +96,15 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     layout = layout_for(choice, facets, kept)
     raise_all(JobError, names_problems(job, len(layout.pages), facets.count))
     demand_memory(job, layout)
-    scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps))
+    store = TextureStore(texture_limits(job))
+    scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps), store)
     return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)
+
+
+def texture_limits(job: JobFile) -> TextureLimits:
+    """What the textures of a job may take, and how well they are filtered."""
+    how = job.render
+    return TextureLimits(how.texture_memory, how.max_texture, how.anisotropy)
 
 
 def facets_and_layout(job: JobFile) -> tuple[Facets, Path | PackSpec | UvLayoutSpec]:

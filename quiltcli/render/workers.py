@@ -47,6 +47,7 @@ from quiltcli.render.crew import Threads, plan_of
 from quiltcli.render.setup import Stage
 from quiltcli.render.shared import SharedArrays
 from quiltcli.render.workplace import Fault, Item, Moved, Task, Workplace, serve
+from quiltcli.scene.textures.tangents import tangents_of
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import (
@@ -145,6 +146,7 @@ class Pool:
         self._frame = 0
         # Made once, before there are copies of the process.
         _ = stage.scene.planes, stage.scene.corner_normals, stage.scene.corner_colors
+        tangents_of(stage.scene)
         if stage.job.render.backface_culling:
             _ = stage.scene.facing
         self._workers: list[_Worker] = []

@@ -30,6 +30,7 @@ class Baked:
         infinite: triangles dropped for a vertex that is NaN, infinite or beyond `FARTHEST`.
         empty: triangles dropped for having no area.
         uv: (V, 2) texture coordinates, NaN where a part has none, or None where no part has any.
+        uv1: (V, 2) those of the second set, likewise.
         source: (V,) the vertex of the joined parts each one is a copy of.
         group: (V,) numbers that vertices of one computed normal share, -1 where the file gives one.
     """
@@ -45,6 +46,7 @@ class Baked:
     source: IntArray
     group: IntArray
     uv: FloatArray | None = None
+    uv1: FloatArray | None = None
 
 
 def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
@@ -67,13 +69,13 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
     triangles, owner = triangles[keep], owner[keep]
 
     given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
-    colors, uv = _given_colors(parts), given_uv(parts)
+    colors, uv, uv1 = _given_colors(parts), *given_uv(parts)
     source, triangles, normals, group = _with_normals(
         vertices,
         triangles,
         given,
         180.0 if mode != "auto" else CREASE_DEG,
-        keep_sources=colors is not None or uv is not None,
+        keep_sources=any(values is not None for values in (colors, uv, uv1)),
     )
     return Baked(
         vertices=vertices[source],
@@ -85,6 +87,7 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
         infinite=int(np.count_nonzero(infinite)),
         empty=int(np.count_nonzero(empty)),
         uv=None if uv is None else uv[source],
+        uv1=None if uv1 is None else uv1[source],
         source=source,
         group=group,
     )
@@ -149,11 +152,19 @@ def _given_colors(parts: Sequence[Part]) -> Float32Array | None:
     )
 
 
-def given_uv(parts: Sequence[Part] | Sequence[Baked]) -> FloatArray | None:
-    """Texture coordinates (V, 2) of all, NaN where some have none; None where none has."""
-    if all(part.uv is None for part in parts):
+def given_uv(parts: Sequence[Part] | Sequence[Baked]) -> tuple[FloatArray | None, FloatArray | None]:
+    """Texture coordinates (V, 2) of both sets, NaN where some have none; None where none has."""
+    sets = [[part.uv for part in parts], [part.uv1 for part in parts]]
+    counts = [len(part.vertices) for part in parts]
+    first, second = (_joined_uv(values, counts) for values in sets)
+    return first, second
+
+
+def _joined_uv(values: Sequence[FloatArray | None], counts: Sequence[int]) -> FloatArray | None:
+    if all(uv is None for uv in values):
         return None
-    return np.concatenate([np.full((len(p.vertices), 2), np.nan) if p.uv is None else p.uv for p in parts])
+    pairs = zip(values, counts, strict=True)
+    return np.concatenate([np.full((count, 2), np.nan) if uv is None else uv for uv, count in pairs])
 
 
 def _with_normals(

@@ -19,6 +19,7 @@ from quiltcli.scene.lights import Light, default_lights, directional, lights_of,
 from quiltcli.scene.materials import Surface, material_table
 from quiltcli.scene.objects import Brought, ObjectError, SceneObject, bring, load_object
 from quiltcli.scene.scene import Scene
+from quiltcli.scene.textures.notices import textures_not_drawn, textures_without_places
 
 if TYPE_CHECKING:
     from quiltcli.job.scene import LightSpec, ObjectSpec, SceneFile
@@ -57,7 +58,6 @@ class _Gathered:
     baked: list[Baked] = field(default_factory=list)
     materials: list[list[int]] = field(default_factory=list)
     surfaces: dict[Surface, int] = field(default_factory=dict)
-    textures: int = 0
     coverage: Coverage = NOTHING
     notices: list[str] = field(default_factory=list)
     lights: list[FileLight] = field(default_factory=list)
@@ -74,8 +74,9 @@ class _Gathered:
         self.names.append(name)
         self.baked.append(baked)
         self.materials.append([self.surfaces.setdefault(s, len(self.surfaces)) for s in surfaces])
-        self.textures += asset.textures
         self.coverage += asset.coverage
+        self.notices += [f"{name}: {words}" for words in textures_not_drawn(surfaces)]
+        self.notices += [f"{name}: {words}" for words in textures_without_places(baked, surfaces)]
         for count, why in ((baked.infinite, "with NaN or infinite vertices"), (baked.empty, "of no area")):
             if count:
                 self.notices.append(f"{name}: {counted(count, 'triangle')} {why} dropped")
@@ -174,6 +175,7 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
     base = np.cumsum([0, *(len(b.vertices) for b in baked)])
     rows = [np.array(m, dtype=np.int32)[b.part] for m, b in zip(gathered.materials, baked, strict=True)]
     triangles = [b.triangles + start for b, start in zip(baked, base, strict=False)]
+    uv, uv1 = given_uv(baked)
     return Scene(
         vertices=np.concatenate([b.vertices for b in baked]),
         triangles=np.concatenate(triangles).astype(np.int32),
@@ -186,7 +188,8 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         materials=material_table(list(gathered.surfaces)),
         lights=lights_in(lights, gathered.lights),
         background=np.array(background, dtype=np.float32),
-        uv=given_uv(baked),
+        uv=uv,
+        uv1=uv1,
         coverage=gathered.coverage,
         notices=_notices(gathered, lights),
     )
@@ -198,9 +201,6 @@ def _colors(baked: Baked) -> Float32Array:
 
 def _notices(gathered: _Gathered, lights: Sequence[LightSpec]) -> tuple[str, ...]:
     notices = list(gathered.notices)
-    if gathered.textures:
-        textures = counted(gathered.textures, "texture")
-        notices.append(f"textures are not drawn yet: {textures} ignored, base colours are shown instead")
     if not _has_lamps(lights, gathered.lights):
         left_out = any("of the file left out" in notice for notice in notices)
         why = "no lights are asked for" if left_out else "the scene has no lights"

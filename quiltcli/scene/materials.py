@@ -3,39 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from quiltcli.geometry import Float32Array
 from quiltcli.job.model import FARTHEST
 from quiltcli.scene.scene import Materials
+from quiltcli.scene.textures.picture import Picture
+
+if TYPE_CHECKING:
+    from quiltcli.job.scene import MaterialSpec
 
 
 @dataclass(frozen=True)
 class Texture:
-    """An image that varies a surface; carried along, not drawn yet.
+    """A picture that varies a surface.
 
     Attributes:
-        role: what it varies: `color`, `emission`, `roughness`, `metallic`, `opacity`, `normal`, `bump`, …
-        path: its file.
-        offset: added to texture coordinates (u, v), v up.
-        scale: multiplies them first.
-        clamp: whether they are held to 0…1 instead of repeating.
-        strength: multiplies a bump.
+        role: what it varies: `color`, `emission`, `roughness`, `metallic`, `normal`, `occlusion`, and what
+            is not drawn: `opacity`, `bump`, …
+        picture: where its pixels come from.
+        matrix: (2 · 3) row by row: u, v of the picture from the vertices' texture coordinates, both with
+            v down from the picture's upper edge.
+        uv_set: which texture coordinates, 0 or 1.
+        wrap: `repeat`, `clamp` or `mirror` along u and v.
+        strength: scale of a normal map or a bump, strength of an occlusion map.
         gain: base and gain: values become base + gain · value.
-        channel: the channel to use, empty for what the role asks for.
+        channel: r, g, b or a where the role takes one number; empty for the first.
+        use: whose texture it is, for messages.
     """
 
     role: str
-    path: str
-    offset: tuple[float, float] = (0.0, 0.0)
-    scale: tuple[float, float] = (1.0, 1.0)
-    clamp: bool = False
+    picture: Picture
+    matrix: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    uv_set: int = 0
+    wrap: tuple[str, str] = ("repeat", "repeat")
     strength: float = 1.0
     gain: tuple[float, float] = (0.0, 1.0)
     channel: str = ""
+    use: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)
@@ -60,11 +68,38 @@ class Surface:
     specular: float = 1.0
     textures: tuple[Texture, ...] = ()
 
-    def overridden(self, given: Mapping[str, Any]) -> Surface:
-        """This surface with the keys of `given` in place of its own, without images that vary those."""
+    def overridden(self, given: Mapping[str, Any], textures: Sequence[Texture] = ()) -> Surface:
+        """This surface with the keys of `given` in place of its own, without images that vary those.
+
+        Args:
+            given: values by name.
+            textures: pictures that vary it from now on.
+        """
         changes: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-        changes.setdefault("textures", tuple(t for t in self.textures if t.role not in changes))
+        gone = {*changes, *(texture.role for texture in textures)}
+        kept = tuple(texture for texture in self.textures if texture.role not in gone)
+        changes.setdefault("textures", (*kept, *textures))
         return replace(self, **changes)
+
+
+def textures_of(material: MaterialSpec) -> tuple[Texture, ...]:
+    """The pictures that a scene file puts on an object; v is up in its numbers, as in most programs."""
+    spec = material.textures
+    if spec is None:
+        return ()
+    (su, sv), (ou, ov) = spec.scale, spec.offset
+    return tuple(
+        Texture(
+            role=role,
+            picture=Picture(str(path)),
+            matrix=(su, 0.0, ou, 0.0, sv, 1.0 - sv - ov),
+            uv_set=spec.uv_set,
+            wrap=(spec.wrap, spec.wrap),
+            strength=spec.strength if role == "normal" else 1.0,
+            use=f"material.textures.{role}",
+        )
+        for role, path in spec.pictures().items()
+    )
 
 
 def material_table(surfaces: Sequence[Surface]) -> Materials:

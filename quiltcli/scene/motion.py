@@ -12,6 +12,7 @@ from quiltcli.errors import Problem, SceneError
 from quiltcli.scene.load import lights_in, load_objects, scene_of, wants_lights
 from quiltcli.scene.objects import Brought, SceneObject
 from quiltcli.scene.scene import Scene, facing_anywhere
+from quiltcli.scene.textures.pool import TextureStore
 
 if TYPE_CHECKING:
     from quiltcli.job.scene import SceneFile
@@ -39,12 +40,14 @@ class MovingScene:
         objects: its objects.
         base: the scene with each object as it is at its start.
         fps: frames a second.
+        store: makes the textures; None where nothing will be drawn.
     """
 
     spec: SceneFile
     objects: tuple[SceneObject, ...]
     base: Scene
     fps: float
+    store: TextureStore | None = None
     _last: list[_Last] = field(default_factory=list)
 
     def scene_at(self, frame: float) -> Scene:
@@ -68,7 +71,7 @@ class MovingScene:
         if _alike(brought, last.brought):
             scene = self._posed(last.scene, brought)
         else:
-            scene = scene_of(self.spec, self.objects, brought)
+            scene = covered(scene_of(self.spec, self.objects, brought), self.store)
         self._last[:] = [_Last(brought, scene)]
         return scene
 
@@ -107,17 +110,26 @@ def _alike(some: Sequence[Brought], others: Sequence[Brought]) -> bool:
     return all(a.baked.triangles is b.baked.triangles and a.asset is b.asset for a, b in pairs)
 
 
-def load_moving_scene(spec: SceneFile, fps: float) -> tuple[Scene, MovingScene | None]:
+def covered(scene: Scene, store: TextureStore | None) -> Scene:
+    """The scene with the pictures that cover its surfaces, where a store makes them."""
+    textures = None if store is None else store.of(scene.materials.textures)
+    return scene if textures is None else replace(scene, textures=textures)
+
+
+def load_moving_scene(
+    spec: SceneFile, fps: float, store: TextureStore | None = None
+) -> tuple[Scene, MovingScene | None]:
     """A scene with each object as it is at its start, and what gives its frames if something in it moves.
 
     Args:
         spec: the scene file.
         fps: frames a second.
+        store: makes the textures; None for a scene that is looked into and not drawn.
 
     Raises:
-        SceneError: as for `load.load_scene`.
+        SceneError: as for `load.load_scene`, and of textures.
     """
     objects = load_objects(spec)
-    base = scene_of(spec, objects, [one.start for one in objects])
+    base = covered(scene_of(spec, objects, [one.start for one in objects]), store)
     moves = any(item.moves for item in spec.objects)
-    return base, MovingScene(spec, objects, base, fps) if moves else None
+    return base, MovingScene(spec, objects, base, fps, store) if moves else None

@@ -19,8 +19,9 @@ from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.gltf import FileLight, Playing, gltf_lights, gltf_parts
 from quiltcli.scene.importers.part import Part, moved, placed
-from quiltcli.scene.materials import Surface
+from quiltcli.scene.materials import Surface, textures_of
 from quiltcli.scene.movers import Mover
+from quiltcli.scene.textures.pool import check_textures
 
 if TYPE_CHECKING:
     from quiltcli.job.scene import ObjectSpec
@@ -120,7 +121,7 @@ def bring(
     Raises:
         SceneError: nothing of it can be drawn.
     """
-    override = {} if item.material is None else item.material.model_dump(exclude_none=True)
+    override = {} if item.material is None else item.material.changes()
     parts, lights = asset.parts, () if asset.model is None else gltf_lights(asset.model, time, playing)
     if playing is not None and asset.model is not None:
         parts = gltf_parts(asset.model, time, playing)
@@ -129,7 +130,9 @@ def bring(
         baked = _from_rest(item, asset, baked, Mover(asset.model, playing, matrix, baked), override, time)
     if not len(baked.triangles):
         raise SceneError(Problem("every triangle is without area or not finite", str(item.mesh)))
-    surfaces = tuple(part.surface.overridden(override) for part in parts)
+    given = () if item.material is None else textures_of(item.material)
+    surfaces = tuple(part.surface.overridden(override, given) for part in parts)
+    check_textures(texture for surface in surfaces for texture in surface.textures)
     return Brought(asset, baked, surfaces, _placed_lights(lights, matrix))
 
 

@@ -14,6 +14,7 @@ from quiltcli.scene.lights import Light
 
 if TYPE_CHECKING:
     from quiltcli.scene.materials import Texture
+    from quiltcli.scene.textures.pool import Textures
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Materials:
         emission: (M, 3) emitted radiance, linear.
         unlit: (M,) materials that show exactly `color`.
         specular: (M,) 0 to 1, strength of the layer that reflects; metals reflect all the same.
-        textures: the images that vary each, carried along and not drawn yet.
+        textures: the pictures that vary each.
     """
 
     color: Float32Array
@@ -58,6 +59,9 @@ class Scene:
         notices: sentences to tell the user once: what was dropped or assumed.
         uv: (V, 2) texture coordinates, v up, NaN where there are none; None when there are none at all.
         coverage: how the areas of the files' polygons compare with those of their triangles.
+        uv1: (V, 2) those of the second set, likewise.
+        textures: the pictures that surfaces are covered with; None where there are none, and in a scene that
+            was loaded to be looked into, not to be drawn.
     """
 
     vertices: FloatArray
@@ -74,6 +78,8 @@ class Scene:
     notices: tuple[str, ...]
     uv: FloatArray | None = None
     coverage: Coverage = NOTHING
+    uv1: FloatArray | None = None
+    textures: Textures | None = None
 
     @cached_property
     def planes(self) -> FloatArray:

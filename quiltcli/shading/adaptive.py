@@ -17,10 +17,13 @@ from quiltcli.geometry import BoolArray, FloatArray
 from quiltcli.scene import Scene
 from quiltcli.shading.brdf import alpha
 from quiltcli.shading.lights import Middle, asks_for_places, turns
-from quiltcli.shading.materials import albedo_at, vertex_colors
+from quiltcli.shading.materials import albedo_at, emission_at, occlusion_at, vertex_colors
 from quiltcli.shading.nodes import NodeColors, nodes_of, points_at_nodes
 from quiltcli.shading.shade import Light, Shades, filled, shade, shade_apart
+from quiltcli.shading.textures import covers
+from quiltcli.shading.textures.bumps import bent
 from quiltcli.visibility.draw import Hits, MixedTiles, Region, WholeTiles
+from quiltcli.visibility.resolve.hits import Points
 from quiltcli.visibility.resolve.vectors import sum_of_products
 
 _FAR = 24.0
@@ -29,6 +32,9 @@ _FAR = 24.0
 _MOST = np.float32(2.0**100)
 _VARIED = 8
 """Vertex colours are smooth where the brightest in a square is at most so many times the darkest."""
+
+_TEXTURED = 512
+"""Microtiles whose pixels fit the cache with all that is needed to look textures up."""
 
 _FLOOR = 1 / 64
 """Where cosines are smaller, single precision is too coarse for a polynomial."""
@@ -51,7 +57,12 @@ class NodeLight:
     def apart(self) -> Light[NodeColors]:
         """Its parts."""
         light = shade_apart(self.scene, self.eye, points_at_nodes(self.squares))
-        return Light(self._of(light.diffuse), self._of(light.specular), self._of(light.emission))
+        return Light(
+            self._of(light.diffuse),
+            self._of(light.specular),
+            self._of(light.emission),
+            None if light.around is None else self._of(light.around),
+        )
 
     def _of(self, colors: Shades) -> NodeColors:
         nodes = nodes_of(self.squares.side)
@@ -71,6 +82,8 @@ class Shaded:
         hits: its visible points.
         nodes: the light of squares, of which these hits are a part; None where light is not smooth.
         part: which of the squares.
+        cover: how textures cover all of them, where that is known: `covers.PLAIN`, `UNLIT` or `BASE`;
+            `FULL` where it differs or light is worked out at every point.
     """
 
     scene: Scene
@@ -78,13 +91,21 @@ class Shaded:
     hits: Hits
     nodes: NodeLight | None = None
     part: slice = field(default_factory=lambda: slice(None))
+    cover: int = covers.FULL
+
+    @cached_property
+    def points(self) -> Points:
+        """The hits' points, their normals as normal maps bend them."""
+        return bent(self.scene, self.hits.points)
 
     @property
     def total(self) -> NodeColors | Shades:
         """All light, at nodes or at points."""
-        if self.nodes is not None:
-            return self.nodes.total[self.part]
-        return shade(self.scene, self.eye, self.hits.points)
+        if self.cover == covers.UNLIT:
+            return self.emission
+        if self.nodes is None:
+            return shade(self.scene, self.eye, self.points)
+        return self._composed if self.cover == covers.BASE else self.nodes.total[self.part]
 
     def pixels(self) -> Shades:
         """All light, at points."""
@@ -95,7 +116,9 @@ class Shaded:
     def apart(self) -> Light[NodeColors] | Light[Shades]:
         """The light's parts, at nodes or at points."""
         if self.nodes is None:
-            return shade_apart(self.scene, self.eye, self.hits.points)
+            return shade_apart(self.scene, self.eye, self.points)
+        if self.cover == covers.BASE:
+            return self._covered
         light, part = self.nodes.apart, self.part
         return Light(light.diffuse[part], light.specular[part], light.emission[part])
 
@@ -104,27 +127,80 @@ class Shaded:
         """The base colour, at points: it may vary as it likes."""
         return filled(albedo_at(self.scene, self.hits.points), self.hits.points)
 
+    @property
+    def emission(self) -> Shades:
+        """What needs no lamp, at points."""
+        return filled(emission_at(self.scene, self.hits.points), self.hits.points)
+
+    @cached_property
+    def _covered(self) -> Light[Shades]:
+        """The parts of light at nodes, and what textures do to them, at points."""
+        assert self.nodes is not None
+        light, part = self.nodes.apart, self.part
+        diffuse = self._open(tuple(light.diffuse[part].pixels()), light.around)
+        return Light(diffuse, tuple(light.specular[part].pixels()), self.emission)
+
+    @property
+    def _composed(self) -> Shades:
+        """All light at points, of that at nodes and of textures that vary from point to point."""
+        light = self._covered
+        albedo, emission = self.albedo, light.emission
+        diffuse, specular = (each * (3 // len(each)) for each in (light.diffuse, light.specular))
+        result = []
+        for k in range(3):
+            total = albedo[k] * diffuse[k]
+            total += specular[k]
+            total += emission[k]
+            result.append(total)
+        return tuple(result)
+
+    def _open(self, diffuse: Shades, around: NodeColors | None) -> Shades:
+        """Diffuse light less what textures say that does not arrive from everywhere."""
+        share = None if around is None else occlusion_at(self.scene, self.hits.points)
+        if around is None or share is None:
+            return diffuse
+        lost = share - np.float32(1)
+        return tuple(
+            np.maximum(d + a * lost, np.float32(0))
+            for d, a in zip(diffuse, around[self.part].pixels(), strict=True)
+        )
+
 
 def shaded(regions: Iterable[Region], scene: Scene, eye: FloatArray) -> Iterator[Shaded]:
     """The hits of all regions, with light at nodes where it is smooth.
 
     A square in which it is not is looked at by microtiles, a microtile pixel by pixel.
     """
+    of_material = covers.covers_of(scene)
     for region in regions:
         if isinstance(region, MixedTiles):
             yield from (Shaded(scene, eye, hits) for hits in region.hits())
-            continue
-        # Light at nine nodes a square where these tell enough of it.
-        smooth = is_smooth(region, scene, eye)
-        some = region.of(smooth)
-        nodes = NodeLight(scene, eye, some)
-        for part in some.parts():
-            yield Shaded(scene, eye, some[part].read(), nodes, part)
-        # What is left: smaller squares, or if there are none, pixels.
-        if region.side > 1:
-            yield from shaded(region.split(~smooth), scene, eye)
+        elif of_material is None:
+            yield from _shaded_whole(region, scene, eye, covers.PLAIN)
         else:
-            yield from (Shaded(scene, eye, hits) for hits in region.of(~smooth).hits())
+            cover = of_material.take(scene.material.take(region.triangle))
+            for each in np.unique(cover).tolist():
+                yield from _shaded_whole(region.of(cover == each), scene, eye, each)
+
+
+def _shaded_whole(squares: WholeTiles, scene: Scene, eye: FloatArray, cover: int) -> Iterator[Shaded]:
+    """As `shaded`, of squares that textures cover alike."""
+    if cover in (covers.UNLIT, covers.FULL):
+        for part in squares.parts(_TEXTURED):
+            yield Shaded(scene, eye, squares[part].read(), cover=cover)
+        return
+    # Light at nine nodes a square where these tell enough of it.
+    smooth = is_smooth(squares, scene, eye)
+    some = squares.of(smooth)
+    nodes = NodeLight(scene, eye, some)
+    for part in some.parts(*((_TEXTURED,) if cover == covers.BASE else ())):
+        yield Shaded(scene, eye, some[part].read(), nodes, part, cover)
+    # What is left: smaller squares, or if there are none, pixels.
+    if squares.side > 1:
+        for smaller in squares.split(~smooth):
+            yield from _shaded_whole(smaller, scene, eye, cover)
+    else:
+        yield from (Shaded(scene, eye, hits) for hits in squares.of(~smooth).hits())
 
 
 def is_smooth(squares: WholeTiles, scene: Scene, eye: FloatArray) -> BoolArray:

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from quiltcli.channels import CHANNELS, MOST_HALF
 from quiltcli.geometry import FloatArray
 from quiltcli.scene import Scene
+from quiltcli.scene.textures.coordinates import corner_coordinates
 from quiltcli.shading.adaptive import Shaded, shaded
 from quiltcli.shading.materials import albedo_wants
 from quiltcli.shading.nodes import NodeColors
 from quiltcli.shading.shade import Shades, shading_wants
 from quiltcli.shading.surface import shading_normals
+from quiltcli.shading.textures.covers import UNLIT
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Drawing, Wanted
 
@@ -75,7 +77,7 @@ def _triangle(viewer: Viewer, shaded: Shaded) -> Values:
 
 
 def _normal(viewer: Viewer, shaded: Shaded) -> Values:
-    return shading_normals(shaded.hits)
+    return shading_normals(shaded.points)
 
 
 def _point(viewer: Viewer, shaded: Shaded) -> Values:
@@ -87,6 +89,15 @@ def _albedo(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
     return _halves(shaded.albedo)
 
 
+def _texture_place(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+    """Texture coordinates of the first set, v up."""
+    seen = shaded.hits.points
+    assert seen.weights is not None
+    corners = corner_coordinates(shaded.scene, seen.triangle[:, 0], 0)[..., None]
+    second, third = (corners[:, k] - corners[:, 0] for k in (1, 2))
+    return tuple(corners[:, 0] + second * seen.weights[0] + third * seen.weights[1])
+
+
 def _diffuse(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
     return _halves(shaded.apart.diffuse)
 
@@ -96,7 +107,12 @@ def _specular(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
 
 
 def _emission(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
-    return _halves(shaded.apart.emission)
+    return _halves(shaded.emission if shaded.cover == UNLIT else shaded.apart.emission)
+
+
+def normal_wants(scene: Scene) -> Wanted:
+    """What shading normals ask of hits; normal maps bend them."""
+    return Wanted.NORMAL if scene.textures is None else Wanted.NORMAL | Wanted.EDGES
 
 
 # Depths are measured in double precision and rounded once.
@@ -107,8 +123,9 @@ SOURCES: dict[str, Source] = {
     "facet": Source(_facet),
     "object": Source(_object),
     "triangle": Source(_triangle),
-    "N": Source(_normal, lambda _: Wanted.NORMAL),
+    "N": Source(_normal, normal_wants),
     "P": Source(_point, lambda _: Wanted.POSITION),
+    "uv": Source(_texture_place, lambda _: Wanted.WEIGHTS),
     "albedo": Source(_albedo, albedo_wants),
     "diffuse": Source(_diffuse, shading_wants, light=True),
     "specular": Source(_specular, shading_wants, light=True),

@@ -11,7 +11,7 @@ The base gets the light that the layer lets in and out again, so no surface retu
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -23,9 +23,11 @@ from quiltcli.shading.materials import (
     Parameters,
     Values,
     at_materials,
-    lit_at,
+    occlusion_at,
     parameters_of,
     tint_at,
+    varied_emission,
+    varied_parameters,
 )
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.resolve.hits import Points
@@ -51,6 +53,7 @@ class Lobes:
         coat: how much of the base the layer covers, 0 where there is none.
         alpha2: the square of GGX's alpha.
         tint: what varies and multiplies the colour, (n, k) each; None where nothing does.
+        open: (n, k) share of the light from everywhere that arrives; None where all does.
     """
 
     paint: Colors
@@ -62,6 +65,7 @@ class Lobes:
     coat: Values
     alpha2: Values
     tint: Colors | None = None
+    open: Float32Array | None = None
 
     @property
     def base(self) -> Colors:
@@ -92,20 +96,25 @@ def lobes_of(parameters: Parameters) -> Lobes:
 @lru_cache(maxsize=1)
 def _lobe_table(scene: Scene) -> Float32Array:
     """The lobes of the scene's materials side by side (M, 12), for one look-up a point."""
-    paint, emission, *others, _ = astuple(lobes_of(parameters_of(scene.materials)))
+    paint, emission, *others, _, _ = astuple(lobes_of(parameters_of(scene.materials)))
     return np.stack((*paint, *emission, *others), axis=1)
 
 
 def lobes_at(scene: Scene, seen: Points) -> Lobes:
-    """What light needs to know at points: worked out once a material, for only colour varies over one."""
-    table = at_materials(scene, _lobe_table(scene), seen.triangle)
-    paint, emission, others = table[0:3], table[3:6], table[6:]
+    """What light needs to know at points: worked out once a material where textures vary colours alone."""
     tint = tint_at(scene, seen)
-    if tint is not None and scene.materials.unlit.any():
-        lit = lit_at(scene, seen)
-        emission = tuple(e * np.where(lit > 0, _ONE, t) for e, t in zip(emission, tint, strict=True))
-    diffuse, metallic, dielectric, specular90, coat, alpha2 = others
-    return Lobes(paint, emission, diffuse, metallic, dielectric, specular90, coat, alpha2, tint)
+    varied = varied_parameters(scene, seen)
+    if varied is not None:
+        lobes = replace(lobes_of(varied), tint=tint)
+    else:
+        table = at_materials(scene, _lobe_table(scene), seen.triangle)
+        diffuse, metallic, dielectric, specular90, coat, alpha2 = table[6:]
+        paint, emission = table[0:3], table[3:6]
+        lobes = Lobes(paint, emission, diffuse, metallic, dielectric, specular90, coat, alpha2, tint)
+    if tint is None and scene.textures is None:
+        return lobes
+    emission = varied_emission(scene, seen, lobes.emission, tint)
+    return replace(lobes, emission=emission, open=occlusion_at(scene, seen))
 
 
 def alpha(scene: Scene, triangle: Int32Array) -> Values:
@@ -195,7 +204,7 @@ def glints(
     spread *= spread
     spread /= half_angle
     np.minimum(spread, np.float32(2), out=spread)
-    spread *= (a2 - _ONE) * _HALF
+    spread = _scaled(spread, (a2 - _ONE) * _HALF)
     spread += _ONE
     spread *= spread
     # G over 4 (n·l)(n·v), whose numerator and denominator share factors.
@@ -230,8 +239,7 @@ def _fresnel(
 
 def _masking_root(cosine: Float32Array, alpha2: Values) -> Float32Array:
     """√(α² + (1 − α²)·cosine²), of Smith's masking and shadowing."""
-    root = cosine * cosine
-    root *= _ONE - alpha2
+    root = _scaled(cosine * cosine, _ONE - alpha2)
     root += alpha2
     result: Float32Array = np.sqrt(root, out=root)
     return result
@@ -239,10 +247,16 @@ def _masking_root(cosine: Float32Array, alpha2: Values) -> Float32Array:
 
 def _let_through(cosine: Float32Array, coat: Values) -> Float32Array:
     """What a layer lets through at an angle: 1 less the rise of its reflection towards the rim."""
-    result = _fifth(_ONE - cosine)
-    result *= -coat
+    result = _scaled(_fifth(_ONE - cosine), -coat)
     result += _ONE
     return result
+
+
+def _scaled(values: Float32Array, factor: Values) -> Float32Array:
+    """Values times what may vary more than they do; they make way for the result if it has room there."""
+    room = isinstance(factor, np.float32) or factor.size == 1 or values.shape == factor.shape
+    room = room or (values.shape[1] >= factor.shape[1] and values.shape[0] == factor.shape[0])
+    return np.multiply(values, factor, out=values if room else None)
 
 
 def _fifth(value: Float32Array) -> Float32Array:

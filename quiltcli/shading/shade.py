@@ -42,11 +42,14 @@ class Light(Generic[Kind]):
         diffuse: what a white base returns.
         specular: what is reflected by the layer above it.
         emission: what needs no lamp.
+        around: that part of `diffuse` which comes from everywhere, where textures say how much of it arrives;
+            None where none do.
     """
 
     diffuse: Kind
     specular: Kind
     emission: Kind
+    around: Kind | None = None
 
 
 def shading_wants(scene: Scene) -> Wanted:
@@ -85,16 +88,28 @@ def shade_apart(scene: Scene, eye: FloatArray, seen: Points) -> Light[Shades]:
     the colour varies.
     """
     surface, lobes = Surface(seen, eye), lobes_at(scene, seen)
-    layer = layer_of(surface, lobes, lobes.base)
-    white = (lit_at(scene, seen),) * 3
+    grey = all(_is_grey(light.color) for light in scene.lights)
+    base = lobes.base
+    if grey and (_is_grey(base) or not np.any(lobes.metallic)):
+        base = base[:1]
+    layer = layer_of(surface, lobes, base)
+    white = (lit_at(scene, seen),) * len(base)
     bare = replace(lobes, paint=white, tint=None)
-    diffuse, specular = _nothing(), _nothing()
+    diffuse, specular, around = (_nothing(len(base)) for _ in range(3))
     for arrival in arrivals(scene, surface, to_eye=layer is not None):
         for k, part, glint in _reflected(bare, white, layer, arrival):
             diffuse[k] = diffuse[k] + part
+            if arrival.nl is None:
+                around[k] = around[k] + part
             if glint is not None:
                 specular[k] = specular[k] + glint
-    return Light(filled(diffuse, seen), filled(specular, seen), filled(lobes.emission, seen))
+    occluded = scene.textures is not None and "occlusion" in scene.textures.slots
+    return Light(
+        filled(diffuse, seen),
+        filled(specular, seen),
+        filled(lobes.emission, seen),
+        filled(around, seen) if occluded else None,
+    )
 
 
 def _reflected(
@@ -110,7 +125,8 @@ def _reflected(
     if arrival.nl is None or arrival.received is None:
         for k in range(len(base)):
             part = lobes.paint[k] * arrival.color[k]
-            yield k, part if lobes.tint is None else part * lobes.tint[k], None
+            part = part if lobes.tint is None else part * lobes.tint[k]
+            yield k, part if lobes.open is None else part * lobes.open, None
         return
     received: Float32Array = arrival.received
     reflected: tuple[Float32Array | None, ...] = (None,) * len(base)
@@ -133,11 +149,11 @@ def _is_grey(color: Colors | Float32Array) -> bool:
     return all(isinstance(value, np.float32) and value == red for value in color)
 
 
-def _nothing() -> list[Values]:
-    return [np.float32(0)] * 3
-
-
 def filled(values: Iterable[Values], seen: Points) -> Shades:
     """Numbers as arrays that stand for all points."""
     shape = seen.triangle.shape
     return tuple(np.full(shape, v) if isinstance(v, np.float32) else v for v in values)
+
+
+def _nothing(count: int) -> list[Values]:
+    return [np.float32(0)] * count

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray
-from quiltcli.visibility.resolve.hits import Hits, Points
+from quiltcli.visibility.resolve.hits import Points
 from quiltcli.visibility.resolve.vectors import Vectors, products, vector_values
 
 _ONE = np.float32(1)
@@ -62,10 +62,10 @@ class Surface:
         return result
 
 
-def shading_normals(hits: Hits) -> Float32Array:
+def shading_normals(points: Points) -> Float32Array:
     """Unit normals (3, G, k), or (3, 1, 1) one for all, as shading uses them: on the side of the eye."""
-    assert hits.normal is not None
-    return np.multiply(vector_values(hits.normal), over_length(hits.normal))
+    assert points.normal is not None
+    return np.multiply(vector_values(points.normal), over_length(points.normal))
 
 
 def over_length(vectors: Vectors, sign: np.float32 = _ONE) -> Float32Array:

@@ -18,6 +18,7 @@ from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.projection.planar import QuiltRays
 from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.resolve.footprints import Cells
 from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.pixels import MixedTiles
 from quiltcli.visibility.resolve.reader import Reader
@@ -55,6 +56,7 @@ from quiltcli.visibility.setup.prewarp import (
 __all__ = [
     "BlockPairs",
     "Blocks",
+    "Cells",
     "Drawing",
     "Frame",
     "Hits",
@@ -118,6 +120,7 @@ class Drawing:
         table: planes of the pairs.
         limits: how depth is measured.
         bits: bits of the serial in a key.
+        cells: the parts of pixels that its samples stand for; None for all of them.
     """
 
     blocks: Blocks
@@ -125,6 +128,7 @@ class Drawing:
     table: PlaneTable
     limits: DepthRange
     bits: int
+    cells: Cells | None = None
 
     def regions(
         self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None, largest: int = SQUARE
@@ -136,7 +140,9 @@ class Drawing:
             scene: what was drawn; its normals are needed where they are wanted.
             largest: microtiles from side to side of the largest regions, SQUARE or 1.
         """
-        reader = Reader(self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted)
+        reader = Reader(
+            self.canvas, self.table, self.blocks, self.limits, self.bits, scene, wanted, self.cells
+        )
         return read_canvas(reader, largest)
 
     def hits(self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None) -> Iterator[Hits]:
@@ -177,13 +183,16 @@ def rasterize(
     drawing.done()
 
 
-def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None) -> Drawing:
+def draw(
+    frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None, cells: Cells | None = None
+) -> Drawing:
     """Draw the triangles of one batch.
 
     Args:
         frame: the frame.
         batch: one of `batches(frame)`.
         sample: (F, 2) where in each facet's pixels to look, in pixels from their centres; None for there.
+        cells: the parts of the pixels that the sample stands for; None for all of them.
     """
     # What will be drawn on: the batch's microtiles, their rays, and how keys of depth are made.
     counts = frame.pairs.per_block
@@ -210,4 +219,4 @@ def draw(frame: Frame, batch: tuple[int, int], sample: FloatArray | None = None)
     rows, culled = np.flatnonzero(some & small), frame.sight.culled
     draw_small(pairs, rows, table, canvas, limits, bits, by, covering, culled=culled)
     draw_large(large, spans, covering, canvas, limits, bits, by)
-    return Drawing(frame.blocks, canvas, table, limits, bits)
+    return Drawing(frame.blocks, canvas, table, limits, bits, cells)

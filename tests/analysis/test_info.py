@@ -225,9 +225,10 @@ KEYS = {
     " polygons sha256 shared_edges viewing_side",
     "out/layout.yaml": "display display_sha256 facets fill kind method padding pages path pixels places"
     " quilt_pixels transforms",
-    "scene.yaml": "background bounds kind lights materials moves notices objects path triangles vertices",
+    "scene.yaml": "background bounds kind lights materials moves notices objects path textures triangles"
+    " vertices",
     "walls.obj": "area background bounds kind lights materials notices objects path polygons"
-    " texture_coordinates triangles vertices",
+    " texture_coordinates textures triangles vertices",
     "job.yaml": "eye_bounds frame_count frames job kind path path_length_m seconds sha256",
     "out/quilt/page_01.0001.exr": "kind parts path",
 }

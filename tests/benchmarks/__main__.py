@@ -15,11 +15,11 @@ from typing import Any
 
 import click
 
-from tests.benchmarks import curves, duels, meshes, opengl, page, sequence, tables
+from tests.benchmarks import curves, duels, meshes, opengl, page, sequence, tables, textured
 from tests.benchmarks.race import canary, crowding
 
 ROOT = Path(__file__).parents[2]
-PARTS = ("duels", "sequences", "facets", "pixels", "triangles")
+PARTS = ("duels", "textures", "sequences", "facets", "pixels", "triangles")
 
 
 @click.command(help=__doc__)
@@ -92,6 +92,10 @@ def _measure(
                 found = duels.duel(name, rounds, Path(scratch), quick=quick)
                 results.setdefault("duels", {})[name] = found
                 keep(name)
+        if "textures" in parts:
+            for name in ("mixed",) if quick else textured.SCENES:
+                results.setdefault("textures", {})[name] = textured.measure(name, rounds, Path(scratch))
+                keep(f"textures, {name}")
         if "sequences" in parts:
             for compression in ("zip",) if quick else ("zip", "zstd"):
                 one = sequence.measure(meshes.detailed(3), 4 if quick else 20, compression, Path(scratch))
@@ -114,6 +118,8 @@ def _tell(results: Mapping[str, Any], clock: str) -> None:
     made = results.get("curves", {})
     if "duels" in results:
         click.echo("\n" + tables.time_table(results, clock) + "\n\n" + tables.ratio_table(results, clock))
+    if "textures" in results:
+        click.echo("\n" + tables.texture_table(results))
     if "sequences" in results:
         click.echo("\n" + tables.sequence_table(results))
     for rows in made.values():

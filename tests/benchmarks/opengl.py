@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.render.setup import Stage
@@ -21,9 +22,11 @@ _VERTEX = """#version 330
 uniform mat4 matrix;
 in vec3 position;
 in vec3 normal;
+in vec2 uv;
 out vec3 surface;
 out vec3 point;
-void main() { gl_Position = matrix * vec4(position, 1); surface = normal; point = position; }
+out vec2 place;
+void main() { gl_Position = matrix * vec4(position, 1); surface = normal; point = position; place = uv; }
 """
 
 _LAMBERT = """#version 330
@@ -59,6 +62,13 @@ void main() {
     color = vec4(base * 0.1 + 3 * (base * diffuse + vec3(0.04) * layer + vec3(specular * grazing)), 1);
 }
 """
+# The same under a picture.
+_TEXTURED = _GGX.replace(
+    "const vec3 base = vec3(0.8, 0.5, 0.3), sun", "in vec2 place;\nuniform sampler2D picture;\nconst vec3 sun"
+).replace(
+    "void main() {", "void main() {\n    vec3 base = texture(picture, place).rgb * vec3(0.8, 0.5, 0.3);"
+)
+_SRGB8 = 0x8C41
 
 
 def renderer() -> str:
@@ -95,7 +105,9 @@ class _Draw:
 class Quilt:
     """A quilt of one page on the renderer, and a frame's draws; a context manager."""
 
-    def __init__(self, stage: Stage, frame: Frame, *, culling: bool) -> None:
+    def __init__(
+        self, stage: Stage, frame: Frame, *, culling: bool, picture: NDArray[np.uint8] | None = None
+    ) -> None:
         self._context = _context()
         size = tuple(stage.layout.pages[0].tolist())
         colour = self._context.texture(size, 4, dtype="f2")
@@ -107,7 +119,9 @@ class Quilt:
         self._culling = culling
         triangle, _ = facet_pairs(frame)
         scene = stage.scene
-        vertices = np.hstack((frame.sight.vertices.astype(np.float32), scene.normals))
+        uv = np.zeros((len(scene.vertices), 2)) if scene.uv is None else scene.uv
+        places = frame.sight.vertices.astype(np.float32)
+        vertices = np.hstack((places, scene.normals, uv.astype(np.float32)))
         self._vertices = self._context.buffer(vertices.tobytes())
         self._sorted = self._context.buffer(
             np.ascontiguousarray(scene.triangles[triangle]).tobytes() or b"0" * 12
@@ -116,8 +130,14 @@ class Quilt:
         self._indices = scene.triangles.size
         self._programs = {
             name: self._context.program(vertex_shader=_VERTEX, fragment_shader=shader)
-            for name, shader in (("lambert", _LAMBERT), ("ggx", _GGX))
+            for name, shader in (("lambert", _LAMBERT), ("ggx", _GGX), ("textured", _TEXTURED))
         }
+        if picture is not None:
+            size = picture.shape[1::-1]
+            texture = self._context.texture(size, 3, picture.tobytes(), internal_format=_SRGB8)
+            texture.build_mipmaps()
+            texture.filter = self._context.LINEAR_MIPMAP_LINEAR, self._context.LINEAR
+            texture.use()
 
     def __enter__(self) -> Quilt:
         return self
@@ -138,7 +158,10 @@ class Quilt:
         target.clear(0, 0, 0, 0, depth=1)
         wanted = context.DEPTH_TEST | (context.CULL_FACE if self._culling else context.NOTHING)
         context.enable_only(wanted)
-        content = [(self._vertices, "3f 3f", "position", "normal")]
+        if "uv" in program:
+            content = [(self._vertices, "3f 3f 2f", "position", "normal", "uv")]
+        else:
+            content = [(self._vertices, "3f 3f 8x", "position", "normal")]
         array = context.vertex_array(program, content, self._whole if whole_mesh else self._sorted)
         for draw in self._draws:
             target.viewport = target.scissor = draw.rectangle

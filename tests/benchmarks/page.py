@@ -47,6 +47,8 @@ def _tables(results: Mapping[str, Any], curves: Mapping[str, Rows]) -> dict[str,
         found["targets"] = tables.target_table(results)
         found["times"] = tables.time_table(results)
         found["ratios"] = tables.ratio_table(results)
+    if "textures" in results:
+        found["textures"] = tables.texture_table(results)
     if "sequences" in results:
         found["sequences"] = tables.sequence_table(results)
     found |= {name: tables.curve_table(rows) for name, rows in curves.items()}

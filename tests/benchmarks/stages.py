@@ -42,9 +42,9 @@ class Place:
     reach: float
 
 
-def cube() -> Place:
-    """Five sides of a cube of 2 m."""
-    return _place(display(CUBE, CUBE_FACES[:5], DENSITY))
+def cube(density: float = DENSITY) -> Place:
+    """Five sides of a cube of 2 m, by default so many pixels a metre."""
+    return _place(display(CUBE, CUBE_FACES[:5], density))
 
 
 def ball(splits: int) -> Place:

@@ -8,6 +8,7 @@ from typing import Any
 
 from tests.benchmarks.race import ratio, seconds
 from tests.benchmarks.targets import KINDS, targets
+from tests.benchmarks.textured import nanoseconds
 
 STAGES = (
     *("bin: first pass", "bin: second pass", "bin", "prewarp", "clear", "small triangles"),
@@ -82,6 +83,23 @@ def ratio_table(results: Mapping[str, Any], clock: str = "wall") -> str:
     embree = ("keys / Embree", "bin + keys / Embree", "frame / Embree")
     others = ("frame / GL draws", "… and read", "matte / GL matte", "… and read", "frame / ZIP")
     return table(("scene/display", "", *embree, *others), rows, 2)
+
+
+def texture_table(results: Mapping[str, Any]) -> str:
+    """Textured frames beside plain ones, in processor time of one process."""
+    rows = []
+    for name, found in results["textures"].items():
+        for kind in ("plain", "trilinear", "anisotropic"):
+            one, many = (nanoseconds(found, f"{kind}{more}") for more in ("", ", 16 samples"))
+            more, theirs = one / nanoseconds(found, "plain"), nanoseconds(found, f"opengl {kind}")
+            rows.append((name, kind, ns(one), share(more), ns(many), f"{many / one:.1f}", ns(theirs)))
+    head = ("scene", "", "ns a pixel", "/ plain", "16 samples", "/ 1 sample", "GL draws")
+    return table(head, rows, 2)
+
+
+def ns(value: float) -> str:
+    """Nanoseconds, a dash for what was not measured."""
+    return "–" if math.isnan(value) else f"{value:,.0f}"
 
 
 def sequence_table(results: Mapping[str, Any]) -> str:

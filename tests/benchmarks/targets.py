@@ -34,6 +34,7 @@ def targets(results: Mapping[str, Any]) -> list[Target]:
     """All targets the results say something about."""
     duels = {name: found["times"] for name, found in results.get("duels", {}).items()}
     found = [*_visibility(duels), *_frames(duels), *_sequences(results.get("sequences", []))]
+    found += _textures({name: one["times"] for name, one in results.get("textures", {}).items()})
     return [target for target in found if not math.isnan(target.value)]
 
 
@@ -86,3 +87,12 @@ def _sequences(sequences: list[Mapping[str, Any]]) -> Iterator[Target]:
     if sequences:
         memory = max(one["memory"] for one in sequences) / 1e9
         yield Target("memory of all processes", "dragon/ball", memory, 3.0, " GB")
+
+
+def _textures(scenes: Mapping[str, Any]) -> Iterator[Target]:
+    """One process, in processor time."""
+    for name, times in scenes.items():
+        value = ratio(times, "trilinear", "plain", "cpu")
+        yield Target("textured frame, trilinear / plain", f"{name}/cube", value, 2.5)
+        value = ratio(times, "anisotropic, 16 samples", "anisotropic", "cpu")
+        yield Target("textured frame, 16 samples / 1", f"{name}/cube", value, 12.0)

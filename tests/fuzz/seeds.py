@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from click.testing import CliRunner
+from PIL import Image
 
 from quiltcli.cli import main
 from tests.helpers.tiny_job import write_tiny_job
@@ -85,7 +86,7 @@ v 1 -1 2
 v 1 1 2
 f 2//1 -2//1 -1//1 3//1
 """
-MTL = "newmtl red\nKd 0.8 0.2 0.1\nNs 40\nd 1\nmap_Kd none.png\n"
+MTL = "newmtl red\nKd 0.8 0.2 0.1\nNs 40\nd 1\nmap_Kd red.png\n"
 PLY = """\
 ply
 format ascii 1.0
@@ -219,6 +220,7 @@ def write_seeds(folder: Path) -> None:
     }  # fmt: skip
     for name, text in texts.items():
         (folder / name).write_text(text)
+    Image.new("RGB", (2, 2), (200, 100, 50)).save(folder / "red.png")
     _write_binary_meshes(folder)
     for command in (
         "pack display.yaml --method rows --size 80x80 -o layout.yaml",

@@ -14,13 +14,14 @@ from quiltcli.job.reference import EXAMPLES, keys, pages, split_unit
 from quiltcli.job.schema import schema_of
 
 DOCS = Path(__file__).parents[2] / "docs"
-MEASURES = r"metre|pixel|degree|second|frame|m, cm|linear|radian|m/s|Hz"
+MEASURES = r"metre|pixel|degree|second|frame|m, cm|megabyte|linear|radian|m/s|Hz"
 # Keys whose number is a bare one: counts, ratios, factors, numbers of things, directions.
 BARE = {
     *("quilt_display", "quilt_job", "quilt_layout", "quilt_scene"),
     *("id", "page", "max_pages", "page_facets", "samples"),
     *("aspect", "metallic", "roughness", "specular", "scale", "matrix", "facets"),
     *("look", "up", "direction", "color", "emission", "orientation"),
+    *("uv_set", "offset", "strength"),
 }
 
 

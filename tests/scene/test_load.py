@@ -208,20 +208,18 @@ def test_gltf_materials_and_textures(tmp_path):
     assert scene.materials.metallic[0] == 0.25
     assert scene.materials.roughness[0] == 1
     assert scene.materials.emission[0].tolist() == [1, 0, 0]
-    assert scene.notices == (
-        "textures are not drawn yet: 1 texture ignored, base colours are shown instead", HEADLIGHT,
-    )  # fmt: skip
+    assert scene.notices == (HEADLIGHT,)
+    (texture,) = scene.materials.textures[0]
+    assert (texture.role, texture.picture.size("").width) == ("color", 2)
 
 
-def test_textures_of_obj_are_counted_once(tmp_path):
-    write(tmp_path / "m.mtl", "newmtl a\nmap_Kd one.png\nnewmtl b\nmap_Kd two.png\n")
+def test_textures_that_are_not_drawn_are_counted_once(tmp_path):
+    write(tmp_path / "m.mtl", "newmtl a\nmap_Ks one.png\nnewmtl b\nmap_Ks two.png\ndisp three.png\n")
     text = (
         "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 3/1 2/1 1/1\n"
     )
     scene = load_scene(write(tmp_path / "m.obj", text))
-    assert (
-        scene.notices[0] == "textures are not drawn yet: 2 textures ignored, base colours are shown instead"
-    )
+    assert scene.notices[0] == "m: 3 textures not drawn (displacement, specular)"
 
 
 def test_texture_coordinates_alone_are_no_texture(tmp_path):
@@ -268,6 +266,6 @@ def test_what_cannot_be_drawn_is_dropped_and_counted(tmp_path):
 
 
 def test_nothing_is_said_on_the_side(tmp_path, capfd):
-    write(tmp_path / "m.mtl", "newmtl a\nmap_Kd gone.png\n")
+    write(tmp_path / "m.mtl", "newmtl a\nmap_Ks gone.png\n")
     load_scene(write(tmp_path / "m.obj", "mtllib m.mtl\nmtllib gone.mtl\nusemtl a\n" + TRIANGLE))
     assert capfd.readouterr() == ("", "")

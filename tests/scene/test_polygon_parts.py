@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from quiltcli.errors import SceneError
 from quiltcli.scene import load_scene
@@ -78,14 +79,15 @@ def test_images_stay_with_their_materials(tmp_path):
     )
     text = "mtllib m.mtl\n" + SQUARE + "vt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1/1 3/1 4/1\n"
     mesh = written(tmp_path, "m.obj", text)
+    Image.new("RGB", (2, 2)).save(tmp_path / "a b.png")
     scene = load_scene(mesh)
     textures = scene.materials.textures[scene.material[-1]]
-    assert [(t.role, t.path, t.scale) for t in textures] == [
-        ("color", str(tmp_path / "a b.png"), (2, 2)),
-        ("bump", str(tmp_path / "n.png"), (1, 1)),
+    assert [(t.role, t.picture.path, t.matrix) for t in textures] == [
+        ("color", str(tmp_path / "a b.png"), (2, 0, 0, 0, 2, -1)),
+        ("bump", str(tmp_path / "n.png"), (1, 0, 0, 0, 1, 0)),
     ]
     assert scene.materials.textures[scene.material[0]] == ()
-    assert "textures are not drawn yet: 2 textures ignored" in scene.notices[0]
+    assert scene.notices[0] == "m: 1 texture not drawn (bump)"
     part = read_asset(mesh).parts[-1]
     assert [t.role for t in part.surface.overridden({"color": (1, 0, 0)}).textures] == ["bump"]
 

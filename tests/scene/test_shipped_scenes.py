@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from quiltcli.scene import load_scene
 
@@ -26,6 +27,18 @@ def test_the_generator_wrote_the_meshes(tmp_path):
         assert (tmp_path / name).read_bytes() == (SCENES / name).read_bytes()
 
 
+def test_the_generator_drew_the_pictures(tmp_path):
+    program = f"import sys; sys.path.insert(0, {str(SCENES)!r}); import pictures, pathlib;"
+    subprocess.run(
+        [sys.executable, "-c", f"{program} pictures.write(pathlib.Path({str(tmp_path)!r}))"], check=True
+    )
+    made = sorted(path.name for path in tmp_path.iterdir())
+    assert made == sorted(path.name for path in SCENES.glob("*.png"))
+    for name in made:
+        new, old = (np.asarray(Image.open(folder / name)).astype(int) for folder in (tmp_path, SCENES))
+        assert np.abs(new - old).max() <= 1  # functions of other machines may round otherwise
+
+
 @pytest.mark.parametrize(
     ("name", "low", "high"),
     [
@@ -33,6 +46,7 @@ def test_the_generator_wrote_the_meshes(tmp_path):
         ("teapot_in_sphere", (-0.3, 0, -0.3), (0.3, 0.6, 0.3)),
         ("plates_and_sphere", (-0.26, 0, -0.26), (0.26, 0.3, 0.26)),
         ("room", (-3, 0, -3), (3, 3.2, 3)),
+        ("hall", (-3, 0, -3), (3, 3.2, 3)),
     ],
 )
 def test_scenes_load_quietly_and_fit(name, low, high):

@@ -134,7 +134,7 @@ CASES = [
     Case("yaml: fps", [swap(JOB, "frames: 1-4", "frames: 1-4\nfps: 0")], [],
          "job.yaml:5:6: fps: must be greater than 0, got 0"),
     Case("yaml: channel", [swap(JOB, "frames: 1-4", "output: {channels: [rgba, depth]}\nframes: 1-4")], [],
-         "job.yaml:4:27: output.channels[1]: expected rgba, Z, zv, facet, object, triangle, N, P, albedo, diffuse, specular or emission, got the text 'depth'"),
+         "job.yaml:4:27: output.channels[1]: expected rgba, Z, zv, facet, object, triangle, N, P, uv, albedo, diffuse, specular or emission, got the text 'depth'"),
     Case("yaml: compression", [swap(JOB, "frames: 1-4", "output: {compression: zpi}\nframes: 1-4")], [],
          "job.yaml:4:23: output.compression: expected none, rle, zips, zip, piz, zstd, htj2k32, htj2k256, pxr24, b44, b44a, dwaa, dwab or lj2k, got the text 'zpi'"),
     Case("yaml: nothing", [swap(JOB, "frames: 1-4", "output: {quilts: false, facets: false}\nframes: 1-4")], [],

@@ -16,6 +16,10 @@ from quiltcli.job import ObjectSpec, load_scene_file
 from quiltcli.job.frames import format_frames
 from quiltcli.scene import Light, Scene, load_scene
 from quiltcli.scene.lights import KINDS
+from quiltcli.scene.textures.picture import Picture
+from quiltcli.scene.textures.pool import ROLES
+
+_LISTED = 6
 
 
 def scene_info(path: Path) -> Info:
@@ -76,6 +80,7 @@ def mesh_info(path: Path) -> Info:
 def _info(kind: str, path: Path, scene: Scene, more: dict[str, Any], lines: list[tuple[str, str]]) -> Info:
     objects = _objects(scene)
     lights = _light_counts(scene.lights)
+    textures = _textures(scene)
     data = {
         "path": str(path),
         **more,
@@ -83,6 +88,7 @@ def _info(kind: str, path: Path, scene: Scene, more: dict[str, Any], lines: list
         "vertices": len(scene.vertices),
         "bounds": bounds(scene.vertices),
         "materials": len(scene.materials.color),
+        "textures": textures,
         "lights": lights,
         "background": [float(c) for c in scene.background],
         "notices": list(scene.notices),
@@ -96,12 +102,34 @@ def _info(kind: str, path: Path, scene: Scene, more: dict[str, Any], lines: list
         ("vertices", f"{len(scene.vertices):,}"),
         ("bounds", bounds_text(data["bounds"])),
         ("materials", f"{len(scene.materials.color):,}"),
+        *((("textures", _textures_text(textures)),) if textures else ()),
         ("lights", ", ".join(shown + ["a headlight"] * lights["headlight"])),
         ("background", vector(data["background"])),
         *(("note", notice) for notice in scene.notices),
     ]
     columns = ("object", "name", "triangles", "from", "to")
     return Info(kind, data, lines, columns, [_row(i, entry) for i, entry in enumerate(objects, 1)])
+
+
+def _textures(scene: Scene) -> list[dict[str, Any]]:
+    """The pictures that are drawn: what each is, where it is from and what it varies."""
+    found: dict[Picture, tuple[str, set[str]]] = {}
+    for textures in scene.materials.textures:
+        for texture in textures:
+            if texture.role in ROLES:
+                found.setdefault(texture.picture, (texture.use, set()))[1].add(texture.role)
+    result = []
+    for picture, (use, roles) in found.items():
+        size = picture.size(use)
+        varies = [role for role in ROLES if role in roles]
+        result.append({"name": picture.name, "width": size.width, "height": size.height, "varies": varies})
+    return result
+
+
+def _textures_text(textures: Sequence[dict[str, Any]]) -> str:
+    sizes = [f"{entry['width']:,} × {entry['height']:,} ({', '.join(entry['varies'])})" for entry in textures]
+    more = f" and {len(sizes) - _LISTED} more" if len(sizes) > _LISTED else ""
+    return f"{len(sizes):,}: {'; '.join(sizes[:_LISTED])}{more}"
 
 
 def _objects(scene: Scene) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray, IntArray
 from quiltcli.scene import Scene
+from quiltcli.scene.textures.pool import mean_texels
 
 _GRIDS = (512, 362, 256, 181, 128, 91, 64, 45, 32, 23, 16, 11, 8)
 
@@ -50,10 +51,11 @@ def ghost(scene: Scene, centre: FloatArray, budget: int) -> Ghost | None:
 
 
 def _colors(scene: Scene) -> Float32Array:
-    """Colour (V, 3) of every vertex: its own times that of a material it is used with."""
+    """Colour (V, 3) of every vertex: its own times that of its material, pictures by their means."""
     material = np.zeros(len(scene.vertices), dtype=np.int64)
     material[scene.triangles] = scene.material[:, None]
-    shown = scene.materials.color + scene.materials.emission
+    shown = scene.materials.color * mean_texels(scene, "color")
+    shown = shown + scene.materials.emission * mean_texels(scene, "emission")
     return np.clip(scene.colors * shown[material], 0, 1).astype(np.float32)
 
 

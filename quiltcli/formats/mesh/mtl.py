@@ -53,6 +53,7 @@ class MeshTexture:
         strength: multiplies a bump.
         gain: base and gain: values become base + gain · value.
         channel: r, g, b, m (matte), l (luminance), z (depth), or empty.
+        statement: what names it, as the file spells that.
     """
 
     role: str
@@ -64,6 +65,7 @@ class MeshTexture:
     strength: float = 1.0
     gain: tuple[float, float] = (0.0, 1.0)
     channel: str = ""
+    statement: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)
@@ -117,12 +119,13 @@ def read_mtl(data: bytes, folder: Path) -> dict[str, MeshMaterial]:
     to show a mesh.
     """
     library = _Library(folder)
-    for keyword, rest in _statements(plain_text(data).decode("utf-8", errors="replace")):
+    for word, rest in _statements(plain_text(data).decode("utf-8", errors="replace")):
+        keyword = word.lower()
         if keyword == "newmtl":
             library.name = rest
             library.found[rest] = MeshMaterial(rest)
         elif keyword in ROLES and library.name is not None:
-            texture = _texture(ROLES[keyword], rest, folder)
+            texture = _texture(word, rest, folder)
             if texture is not None:
                 kept = library.found[library.name].textures
                 library.change(textures=(*kept, texture))
@@ -151,11 +154,11 @@ def material_named(found: Mapping[str, MeshMaterial], name: str) -> MeshMaterial
 
 
 def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """Yield (keyword in lower case, rest of the line)."""
+    """Yield (keyword, rest of the line)."""
     for line in text.replace("\\\n", " ").split("\n"):
         words = line.split(None, 1)
         if words and not words[0].startswith("#"):
-            yield words[0].lower(), words[1].strip() if len(words) > 1 else ""
+            yield words[0], words[1].strip() if len(words) > 1 else ""
 
 
 def _numbers(rest: str) -> list[float]:
@@ -197,7 +200,7 @@ _VALUES = {
 }
 
 
-def _texture(role: str, rest: str, folder: Path) -> MeshTexture | None:
+def _texture(statement: str, rest: str, folder: Path) -> MeshTexture | None:
     """`[-options] NAME`, the name being all that follows the options, blanks included."""
     given: dict[str, list[str]] = {}
     while True:
@@ -206,7 +209,10 @@ def _texture(role: str, rest: str, folder: Path) -> MeshTexture | None:
             break
         given[option.lower()], rest = _option(option.lower(), after.strip())
     name = without_comment(rest)
-    return MeshTexture(role, name, place_of(folder, name), **_options(given)) if name else None
+    if not name:
+        return None
+    role, options = ROLES[statement.lower()], _options(given)
+    return MeshTexture(role, name, place_of(folder, name), statement=statement, **options)
 
 
 def _option(option: str, rest: str) -> tuple[list[str], str]:

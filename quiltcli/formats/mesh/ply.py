@@ -75,7 +75,7 @@ def _mesh(elements: dict[str, Element], texture: str, binary: bool, path: Path) 
 
 def _textured(name: str, path: Path) -> MeshMaterial:
     """The material of a `comment TextureFile`."""
-    texture = MeshTexture("color", name, place_of(path.parent, name))
+    texture = MeshTexture("color", name, place_of(path.parent, name), statement="TextureFile")
     return MeshMaterial("", textures=(texture,))
 
 

@@ -52,12 +52,13 @@ def cast_frame(
     rays = quilt_rays(stage.layout, lit, viewer.eye)
     target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
+    sloped = stage.scene.textures is not None
     clear(stage, buffers, only)
     lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers)
 
     def draw(address: IntArray) -> int:
         pixels = places(address, stage.layout, stage.owners, rays)
-        hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals)
+        hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals, sloped=sloped)
         if hits.triangle.size:
             fill(buffers, stage.job.output.channels, viewer, Shaded(stage.scene, viewer.eye, hits))
         return hits.inside
@@ -87,8 +88,10 @@ def pixels_of(stage: Stage, lit: BoolArray) -> Iterator[IntArray]:
             yield chunk + start
 
 
-def cast_pixels(target: Target, neighbours: Neighbours, pixels: Places, normals: Float32Array) -> Hits:
-    """What P pixels see; `normals` are the scene's `corner_normals`."""
+def cast_pixels(
+    target: Target, neighbours: Neighbours, pixels: Places, normals: Float32Array, *, sloped: bool = False
+) -> Hits:
+    """What P pixels see; `normals` are the scene's `corner_normals`; `sloped` if textures are looked up."""
     triangle = first_triangles(target, neighbours, pixels)
     rows = np.flatnonzero(triangle >= 0)
     triangle = triangle[rows]
@@ -106,6 +109,7 @@ def cast_pixels(target: Target, neighbours: Neighbours, pixels: Places, normals:
         depth=target.viewer.depth_of(points),
         normals=normals,
         inside=int(np.count_nonzero(~pixels.bleed[rows])),
+        slopes=_slopes(target, triangle, matrix, ray, position) if sloped else None,
     )
 
 
@@ -116,6 +120,32 @@ def _weights(target: Target, triangle: IntArray, position: FloatArray) -> tuple[
     area = dot(normal, normal)
     second = dot(normal, cross(position - a, c - a)) / area
     return second, dot(normal, cross(b - a, position - a)) / area
+
+
+def _slopes(
+    target: Target, triangle: IntArray, matrix: FloatArray, ray: FloatArray, position: FloatArray
+) -> FloatArray:
+    """How the weights of points change from pixel to pixel (2, 2, P) [weight, axis].
+
+    A point is p = t·d with n·p constant, so along an axis p' = t·(d' − d·(n·d')/(n·d)).
+
+    Args:
+        target: the scene.
+        triangle: (P,) which triangles.
+        matrix: (P, 3, 3) page pixel (x, y, 1) → direction from the eye.
+        ray: (P, 3) directions.
+        position: (P, 3) points minus the eye.
+    """
+    normal = target.plane[triangle, :3]
+    along = dot(normal, ray)
+    scale = dot(position, ray) / dot(ray, ray)
+    a = target.corners[target.triangles[triangle, 0]]
+    result = np.empty((2, 2, triangle.size))
+    for axis in range(2):
+        step = matrix[:, :, axis]
+        moved = scale[:, None] * (step - ray * (dot(normal, step) / along)[:, None])
+        result[:, axis] = _weights(target, triangle, a + moved)
+    return result
 
 
 def first_triangles(target: Target, neighbours: Neighbours, pixels: Places) -> IntArray:

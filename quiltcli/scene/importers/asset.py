@@ -10,7 +10,7 @@ from quiltcli.formats.inputs import foreign_fault, open_input
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.formats.mesh.read import READERS, read_polygons
-from quiltcli.scene.importers.gltf import GltfModel, gltf_parts, read_gltf_model, texture_count
+from quiltcli.scene.importers.gltf import GltfModel, gltf_parts, read_gltf_model
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.importers.polygons import parts_of_polygons
 
@@ -23,7 +23,6 @@ class Asset:
 
     Attributes:
         parts: its parts, at rest.
-        textures: how many images its materials want.
         missing: material files it names that are not there.
         notices: what else was dropped or assumed, without a name before it.
         coverage: how the areas of its polygons compare with those of their triangles.
@@ -31,7 +30,6 @@ class Asset:
     """
 
     parts: tuple[Part, ...]
-    textures: int
     missing: tuple[str, ...]
     notices: tuple[str, ...] = ()
     coverage: Coverage = NOTHING
@@ -57,7 +55,6 @@ def _polygon_asset(path: Path) -> Asset:
     except MeshError as error:
         raise SceneError(error.problems) from error
     found = parts_of_polygons(mesh)
-    images = {texture.path for part in found.parts for texture in part.surface.textures}
     notices = []
     if found.too_small:
         notices.append(f"{_faces(found.too_small)} of fewer than 3 corners dropped")
@@ -66,7 +63,7 @@ def _polygon_asset(path: Path) -> Asset:
             f"{_faces(found.coverage.crossing)} whose outline crosses itself, which no triangles can cover"
             f"{_place(mesh, found.coverage.first)}"
         )
-    return Asset(tuple(found.parts), len(images), mesh.missing, tuple(notices), found.coverage)
+    return Asset(tuple(found.parts), mesh.missing, tuple(notices), found.coverage)
 
 
 def _faces(count: int) -> str:
@@ -87,7 +84,7 @@ def _gltf_asset(path: Path) -> Asset:
     if not any(len(part.triangles) for part in parts):
         left_out = "".join(f"; {notice}" for notice in model.gltf.notices)
         raise SceneError(Problem(f"holds no triangles{left_out}", str(path)))
-    return Asset(parts, texture_count(model.gltf), (), model.gltf.notices, model=model)
+    return Asset(parts, (), model.gltf.notices, model=model)
 
 
 def _check_file(path: Path) -> None:

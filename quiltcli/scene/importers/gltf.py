@@ -28,7 +28,8 @@ from quiltcli.formats.gltf.posing import (
 )
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, normalized
 from quiltcli.scene.importers.part import Part
-from quiltcli.scene.materials import Surface
+from quiltcli.scene.materials import Surface, Texture
+from quiltcli.scene.textures.picture import Picture
 
 LUMENS_PER_WATT = 683.0
 _SLOTS = {
@@ -37,6 +38,13 @@ _SLOTS = {
     "normal": "normalTexture",
     "occlusion": "occlusionTexture",
     "emission": "emissiveTexture",
+}
+_ROLES = {
+    "color": (("color", ""),),
+    "metallic_roughness": (("roughness", "g"), ("metallic", "b")),
+    "normal": (("normal", ""),),
+    "occlusion": (("occlusion", "r"),),
+    "emission": (("emission", ""),),
 }
 
 
@@ -194,7 +202,7 @@ def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
         triangles=placed_triangles(piece, mirrored),
         normals=there.normals,
         colors=colors,
-        surface=surface_of(gltf.materials[primitive.material]),
+        surface=surface_of(gltf.materials[primitive.material], gltf),
         uv=_v_up(primitive.uv[0], piece.copies),
         uv1=_v_up(primitive.uv[1], piece.copies),
     )
@@ -205,20 +213,39 @@ def _v_up(uv: FloatArray | None, copies: int) -> FloatArray | None:
     return None if uv is None else np.tile(np.stack((uv[:, 0], 1 - uv[:, 1]), axis=1), (copies, 1))
 
 
-def surface_of(material: Material) -> Surface:
-    """The surface of a material, as far as it is the same everywhere."""
+def surface_of(material: Material, gltf: Gltf | None = None) -> Surface:
+    """The surface of a material; with its textures where the file that holds them is given."""
     return Surface(
         color=material.color[:3],
         metallic=material.metallic,
         roughness=material.roughness,
         emission=(0.0, 0.0, 0.0) if material.unlit else material.emission,
         unlit=material.unlit,
+        textures=() if gltf is None else tuple(_textures(gltf, material)),
     )
 
 
-def texture_count(gltf: Gltf) -> int:
-    """Number of images that materials use."""
-    return len({use.image for material in gltf.materials.values() for use in material.textures.values()})
+def _textures(gltf: Gltf, material: Material) -> Iterator[Texture]:
+    """The textures of a material by role; one picture holds roughness (green) and metal (blue)."""
+    for slot, use in material.textures.items():
+        if material.unlit and slot != "color":
+            continue
+        wrap_u, wrap_v = use.wrap
+        for role, channel in _ROLES[slot]:
+            yield Texture(
+                role=role,
+                picture=Picture(str(gltf.path), gltf.images, use.image),
+                matrix=use.matrix,
+                uv_set=use.uv_set,
+                wrap=(wrap_u, wrap_v),
+                strength=use.strength,
+                channel=channel,
+                use=f"material {_name(material)}, {_SLOTS[slot]}",
+            )
+
+
+def _name(material: Material) -> str:
+    return repr(material.name[:40]) if material.name else material.path
 
 
 def gltf_lights(

@@ -16,8 +16,11 @@ from quiltcli.formats.mesh.polygons import Triangles, plane_coordinates, triangu
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, some_rows
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.materials import Surface, Texture
+from quiltcli.scene.textures.picture import Picture
 
 _KEY_LIMIT = 2**62
+_OF_PICTURES = {"color": (1.0, 1.0, 1.0), "emission": (1.0, 1.0, 1.0), "roughness": 1.0, "metallic": 1.0}
+"""What a picture multiplies in a material that says nothing of it, or 0."""
 
 
 class PolygonParts(NamedTuple):
@@ -121,18 +124,26 @@ def surface_of(material: MeshMaterial | None, *, colored: bool) -> Surface:
     if material.shininess is not None and material.roughness is None:
         # Blinn's exponent to GGX's alpha, 2/(Ns + 2) = alpha², alpha = roughness².
         keys["roughness"] = (2 / (max(material.shininess, 0.0) + 2)) ** 0.25
-    textures = tuple(_texture(texture) for texture in material.textures)
+    textures = tuple(_texture(material, texture) for texture in material.textures)
+    # A picture multiplies what the file says, and is by itself where that says nothing.
+    for texture in textures:
+        if texture.role in _OF_PICTURES and not np.any(getattr(material, texture.role) or 0):
+            keys[texture.role] = _OF_PICTURES[texture.role]
     return surface.overridden({k: v for k, v in keys.items() if v is not None} | {"textures": textures})
 
 
-def _texture(texture: MeshTexture) -> Texture:
+def _texture(material: MeshMaterial, texture: MeshTexture) -> Texture:
+    """A texture of an MTL file, whose coordinates have v up: u' = s·u + o."""
+    (su, sv), (ou, ov) = texture.scale[:2], texture.offset[:2]
+    wrap = "clamp" if texture.clamp else "repeat"
+    use = f"material {material.name[:40]!r}, {texture.statement}" if material.name else texture.statement
     return Texture(
         role=texture.role,
-        path=str(texture.path),
-        offset=texture.offset[:2],
-        scale=texture.scale[:2],
-        clamp=texture.clamp,
+        picture=Picture(str(texture.path)),
+        matrix=(su, 0.0, ou, 0.0, sv, 1.0 - sv - ov),
+        wrap=(wrap, wrap),
         strength=texture.strength,
         gain=texture.gain,
-        channel=texture.channel,
+        channel=texture.channel if texture.channel in ("r", "g", "b") else "",
+        use=use,
     )

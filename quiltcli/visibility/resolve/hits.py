@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.visibility.resolve.footprints import Edges, PointEdges
 from quiltcli.visibility.resolve.vectors import PointVectors, Vectors
 
 RUN = 8
@@ -27,6 +28,8 @@ class Wanted(Flag):
     """Barycentric weights."""
     POSITION = auto()
     """Points, minus the eye."""
+    EDGES = auto()
+    """What attributes and their slopes are worked out by."""
 
 
 def _none() -> IntArray:
@@ -93,6 +96,7 @@ class Points:
         normal: interpolated normals on the side of the eye, of any length.
         weights: (2, n, k) barycentric weights of the triangle's second and third vertex, or None.
         position: (3, n, k) the points minus the eye, world axes, metres, or None.
+        edges: what attributes and their slopes are worked out by, or None.
     """
 
     triangle: Int32Array
@@ -100,6 +104,7 @@ class Points:
     normal: Vectors | None
     weights: Float32Array | None
     position: FloatArray | None
+    edges: Edges | None = None
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,7 @@ class Hits:
         weights: (2, G, k) barycentric weights of the triangle's second and third vertex; None unless wanted.
         position: (3, G, k) the point minus the eye, world axes, metres; None unless wanted.
         inside: how many of the drawn pixels lie in their facet's polygon, not in its bleed.
+        edges: what attributes and their slopes are worked out by; None unless wanted.
     """
 
     places: Places
@@ -132,11 +138,12 @@ class Hits:
     weights: Float32Array | None
     position: FloatArray | None
     inside: int
+    edges: Edges | None = None
 
     @property
     def points(self) -> Points:
         """What shading has to know of them."""
-        return Points(self.triangle[:, None], self.ray, self.normal, self.weights, self.position)
+        return Points(self.triangle[:, None], self.ray, self.normal, self.weights, self.position, self.edges)
 
     @property
     def pixel(self) -> IntArray:
@@ -171,6 +178,7 @@ def point_hits(
     depth: FloatArray,
     normals: Float32Array,
     inside: int,
+    slopes: FloatArray | None = None,
 ) -> Hits:
     """Hits of P single pixels, from points that are known.
 
@@ -183,6 +191,7 @@ def point_hits(
         depth: (P,) depth of the points, metres.
         normals: (T, 12) the scene's `corner_normals`.
         inside: pixels that are not bleed.
+        slopes: (2, 2, P) how the weights change from pixel to pixel [weight, axis], where that is wanted.
     """
     rows = normals.take(triangle, axis=0).T
     towards = np.sign(-(rows[9:12] * position).sum(axis=0))
@@ -198,4 +207,5 @@ def point_hits(
         weights=weights.astype(np.float32)[:, :, None],
         position=position[:, :, None],
         inside=inside,
+        edges=None if slopes is None else PointEdges(triangle, weights, slopes),
     )

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.geometry import FloatArray, IntArray
+from quiltcli.visibility.resolve.footprints import PixelEdges, edge_planes_of
 from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.reader import Reader, rays_through
+from quiltcli.visibility.resolve.scattered import plane_values, values_at
 from quiltcli.visibility.resolve.surfaces import surfaces
 from quiltcli.visibility.resolve.tiles import Tiles, owned_pixels
 from quiltcli.visibility.resolve.vectors import PointVectors, vector_values
@@ -93,10 +95,16 @@ def pixel_hits(
     # Attributes: numerators that are linear over the pixels, by the sum of the edge functions.
     normal = weights = None
     if Wanted.NORMAL in wanted:
-        normal = PointVectors(_values(seen.normal, which, x, y, x0, y0))
+        normal = PointVectors(values_at(seen.normal, which, x, y, x0, y0))
+    edges: PixelEdges | None = None
     if Wanted.WEIGHTS in wanted:
-        second, third, total = _values(seen.weights, which, x, y, x0, y0)
+        second, third, total = values_at(seen.weights, which, x, y, x0, y0)
         weights = np.stack((second / total, third / total)).astype(np.float32)
+    if Wanted.EDGES in wanted:
+        planes_of = edge_planes_of(
+            planes, rows, x0, y0, reader.cells, reader.facet_of(planes.block.take(rows))
+        )
+        edges = PixelEdges(planes_of, which, x.astype(np.float64), y.astype(np.float64), x0, y0)
     return Hits(
         places=places,
         chosen=None,
@@ -108,6 +116,7 @@ def pixel_hits(
         weights=weights,
         position=None if position is None else chosen(position)[:, :, None] / inverse,
         inside=inside,
+        edges=edges,
     )
 
 
@@ -125,46 +134,7 @@ def _inverse(planes: Planes, rows: IntArray, which: IntArray, x: FloatArray, y: 
     for k, column in enumerate((*planes.inverse, planes.low, planes.high)):
         table[:, k] = column.take(rows)
     table = table.take(which, axis=0)
-    result = _plane_values(table, x, y, np.empty(x.size))
+    result = plane_values(table, x, y, np.empty(x.size))
     np.maximum(result, table[:, 3], out=result)
     np.minimum(result, table[:, 4], out=result)
-    return result
-
-
-def _values(
-    planes: NDArray[Any],
-    which: IntArray,
-    x: Float32Array,
-    y: Float32Array,
-    x0: Int32Array,
-    y0: Int32Array,
-) -> NDArray[Any]:
-    """Values (n, G, 1) of n planes (n, 3, S) of surfaces.
-
-    Args:
-        planes: the planes, from places of their own.
-        which: (G,) which surface each pixel sees.
-        x: (G,) columns in the block.
-        y: (G,) rows.
-        x0: (S,) columns at which the planes begin.
-        y0: (S,) rows.
-    """
-    # One look-up of a row takes as long as one of a single number.
-    count = 3 * len(planes)
-    table = np.empty((x0.size, count + 2), dtype=planes.dtype)
-    table[:, :count] = planes.reshape(count, -1).T
-    table[:, count], table[:, count + 1] = x0, y0
-    table = table.take(which, axis=0)
-    x, y = x - table[:, count], y - table[:, count + 1]
-    result = np.empty((len(planes), which.size, 1), dtype=planes.dtype)
-    for k in range(len(planes)):
-        _plane_values(table[:, 3 * k :], x, y, result[k, :, 0])
-    return result
-
-
-def _plane_values(rows: NDArray[Any], x: NDArray[Any], y: NDArray[Any], result: NDArray[Any]) -> NDArray[Any]:
-    """Put into `result` (G,) the values of planes given in rows (G, 3 or more)."""
-    np.multiply(rows[:, 0], x, out=result)
-    result += rows[:, 1] * y
-    result += rows[:, 2]
     return result

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import Float32Array, FloatArray, IntArray
+from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.scene import Scene
+from quiltcli.visibility.resolve.footprints import Cells
 from quiltcli.visibility.resolve.hits import Wanted
 from quiltcli.visibility.resolve.tiles import Tiles
 from quiltcli.visibility.resolve.vectors import BlockVectors
@@ -29,6 +30,7 @@ class Reader:
         bits: bits of the serial in a key.
         scene: what was drawn; None where nothing of its surfaces is wanted.
         wanted: what hits shall tell.
+        cells: the parts of pixels that the canvas's samples stand for; None for all of them.
     """
 
     canvas: Canvas
@@ -38,6 +40,11 @@ class Reader:
     bits: int
     scene: Scene | None
     wanted: Wanted
+    cells: Cells | None = None
+
+    def facet_of(self, block: IntArray | Int32Array) -> Int32Array:
+        """Facets (n,) of blocks by their places in the batch."""
+        return self.blocks.facet[self.canvas.block[block]]
 
     @property
     def corner_normals(self) -> Float32Array:

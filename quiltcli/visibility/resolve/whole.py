@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, slices
+from quiltcli.visibility.resolve.footprints import TileEdges, edge_planes_of
 from quiltcli.visibility.resolve.hits import Hits, Places, Wanted
 from quiltcli.visibility.resolve.reader import Reader, TileRays, rays_through
 from quiltcli.visibility.resolve.surfaces import one_normal, surfaces
@@ -48,6 +49,7 @@ class WholeTiles:
         even: whether each of their triangles has one normal.
         border: whether some of their pixels are not the facet's.
         side: how many microtiles are the side of a square; 1 at the border.
+        edges: what attributes are worked out by; None unless wanted.
     """
 
     reader: Reader
@@ -61,6 +63,7 @@ class WholeTiles:
     even: bool = False
     border: bool = False
     side: int = 1
+    edges: TileEdges | None = None
 
     def __getitem__(self, part: slice | IntArray) -> WholeTiles:
         """Some of the squares."""
@@ -76,6 +79,7 @@ class WholeTiles:
             even=self.even,
             border=self.border,
             side=self.side,
+            edges=None if self.edges is None else self.edges[part],
         )
 
     def of(self, chosen: BoolArray) -> WholeTiles:
@@ -95,9 +99,9 @@ class WholeTiles:
         for part in slices(0, pair.size, AT_ONCE):
             yield whole_tiles(self.reader, tiles[part], pair[part], even=self.even, border=False, side=1)
 
-    def parts(self) -> Iterator[slice]:
-        """Ranges of the squares whose pixels fit the cache."""
-        return slices(0, self.triangle.size, _AT_A_TIME // self.side**2)
+    def parts(self, tiles: int = _AT_A_TIME) -> Iterator[slice]:
+        """Ranges of the squares of so many microtiles, whose pixels fit the cache."""
+        return slices(0, self.triangle.size, max(tiles // self.side**2, 1))
 
     def hits(self) -> Iterator[Hits]:
         """What their pixels see, a cache-sized number at a time."""
@@ -126,6 +130,7 @@ class WholeTiles:
             weights=weights,
             position=None if position is None else position / inverse,
             inside=inside,
+            edges=self.edges,
         )
 
     def _places(self, shape: tuple[int, ...]) -> tuple[Places, IntArray | None, int]:
@@ -159,6 +164,10 @@ def whole_tiles(
     seen = surfaces(reader, pair, wanted, tiles.x, tiles.y)
     if Wanted.NORMAL in wanted:
         normal = TileVectors(seen.normal.astype(np.float64), side)
+    edges: TileEdges | None = None
+    if Wanted.EDGES in wanted:
+        planes = edge_planes_of(reader.table.planes, pair, tiles.x, tiles.y, reader.cells, tiles.facet)
+        edges = TileEdges(planes, side)
     return WholeTiles(
         reader=reader,
         tiles=tiles,
@@ -171,4 +180,5 @@ def whole_tiles(
         even=even,
         border=border,
         side=side,
+        edges=edges,
     )

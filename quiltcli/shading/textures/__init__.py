@@ -1,0 +1,1 @@
+"""Textures at visible points: which picture, where in it, filtered over the pixel's footprint."""

@@ -1,0 +1,165 @@
+"""Pictures of glTF files against Filament, a renderer of others, through one facet; skipped where it is not.
+
+Filament draws with OpenGL: edges are its rasterizer's, levels its own approximation. So pictures are
+enlarged here, where both are bilinear, and pixels at edges of shapes are left out.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import quiltcli
+from quiltcli.scene import load_scene
+from tests.helpers.gltf_files import SQUARE, TWO, GltfFile
+
+filly = pytest.importorskip("filly", reason="Filament is not here (pip install -e '.[crosscheck]')")
+SIZE, FOV = 160, 40.0
+QUAD = [(0, 1), (1, 1), (1, 0), (0, 0)]
+CORNERS = np.array(SQUARE)
+
+
+def picture(file, seed, alpha=False):
+    """An embedded PNG of soft random colours."""
+    dice = np.random.default_rng(seed)
+    small = Image.fromarray(dice.integers(0, 256, (5, 6, 4 if alpha else 3)).astype(np.uint8))
+    stream = io.BytesIO()
+    small.save(stream, format="PNG")
+    return file.add("images", bufferView=file.view(stream.getvalue()), mimeType="image/png")
+
+
+def textured(file, image, *, uv_set=0, transform=None, wrap=(10497, 10497), color=(1, 1, 1, 1)):
+    """An unlit material of a picture."""
+    sampler = file.add("samplers", magFilter=9729, minFilter=9987, wrapS=wrap[0], wrapT=wrap[1])
+    texture = {"index": file.add("textures", source=image, sampler=sampler), "texCoord": uv_set}
+    if transform:
+        texture["extensions"] = {"KHR_texture_transform": transform}
+    return file.add(
+        "materials",
+        pbrMetallicRoughness={"baseColorTexture": texture, "baseColorFactor": color},
+        extensions={"KHR_materials_unlit": {}},
+        doubleSided=True,
+    )
+
+
+def square(file, material, at, uv=QUAD, uv1=None, colors=None):
+    """A unit square at a place, aslant."""
+    attributes = {"TEXCOORD_0": file.accessor(uv)}
+    if uv1 is not None:
+        attributes["TEXCOORD_1"] = file.accessor(uv1)
+    if colors is not None:
+        attributes["COLOR_0"] = file.accessor(colors)
+    places = CORNERS - 0.5 + CORNERS[:, :1] * (0, 0, 0.4)
+    positions = file.accessor(places, min=places.min(axis=0).tolist(), max=places.max(axis=0).tolist())
+    primitive = {"attributes": {"POSITION": positions, **attributes}, "indices": file.accessor(TWO, "u2")}
+    file.node(mesh=file.mesh({**primitive, "material": material}), translation=at)
+
+
+def plain(file):
+    square(file, textured(file, picture(file, 1)), (0, 0, 0))
+
+
+def wraps(file):
+    image, far = picture(file, 2), (np.array(QUAD) * 2.6 - 0.7).tolist()
+    for k, wrap in enumerate([(33071, 33071), (33648, 33648), (10497, 33071), (33648, 10497)]):
+        square(file, textured(file, image, wrap=wrap), (k % 2 * 1.1, k // 2 * 1.1, 0), far)
+
+
+def transforms(file):
+    image = picture(file, 3)
+    turns = [{"offset": [0.3, 0.2]}, {"rotation": 0.5}, {"scale": [1.6, 0.7]}]
+    turns.append({"scale": [1.4, 1.4], "rotation": -0.8})
+    for k, transform in enumerate(turns):
+        square(file, textured(file, image, transform=transform), (k % 2 * 1.1, k // 2 * 1.1, 0))
+
+
+def second_coordinates(file):
+    turned = [QUAD[(k + 1) % 4] for k in range(4)]
+    square(file, textured(file, picture(file, 4), uv_set=1), (0, 0, 0), uv1=turned)
+
+
+def factors_and_vertex_colors(file):
+    colors = np.float32([(1, 0.2, 0.1), (0.1, 1, 0.2), (0.3, 0.2, 1), (1, 1, 1)])
+    square(file, textured(file, picture(file, 5), color=(0.9, 0.5, 0.7, 1)), (0, 0, 0), colors=colors)
+
+
+def alpha_without_blending(file):
+    square(file, textured(file, picture(file, 6, alpha=True)), (0, 0, 0))
+
+
+SCENES = (plain, wraps, transforms, second_coordinates, factors_and_vertex_colors, alpha_without_blending)
+FILES = {make.__name__: make for make in SCENES}
+
+
+def ours(path: Path, eye, target, folder: Path):
+    """Linear R, G, B, A of a square facet that fills the view."""
+    ahead = np.subtract(target, eye)
+    far = np.linalg.norm(ahead)
+    ahead /= far
+    right = np.cross(ahead, (0, 1, 0))
+    right /= np.linalg.norm(right)
+    up, half = np.cross(right, ahead), math.tan(math.radians(FOV / 2)) * far * 0.1
+    middle = eye + ahead * far * 0.1
+    corners = [middle + half * (x * right + y * up) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    lines = "".join("v {:.17g} {:.17g} {:.17g}\n".format(*corner) for corner in corners)
+    (folder / "d.obj").write_text(f"{lines}f 1 2 3 4\n")
+    (folder / "d.yaml").write_text(
+        f"quilt_display: 1\nmesh: d.obj\nresolution: {{facet_pixels: [{SIZE}, {SIZE}]}}\n"
+    )
+    (folder / "j.yaml").write_text(
+        f"quilt_job: 1\ndisplay: d.yaml\nscene: {path.name}\nframes: 1\n"
+        f"viewer: {{near: {far * 0.01}, far: {far * 10}, path: {{keyframes: "
+        f"[{{frame: 1, position: {eye.tolist()}, look_at: {target.tolist()}}}]}}}}\n"
+    )
+    (frame,) = quiltcli.draw(folder / "j.yaml", threads=1)
+    return frame.stack(1).astype(np.float64)
+
+
+@pytest.fixture(scope="module")
+def filament():
+    with filly.Renderer() as renderer:
+        yield renderer
+
+
+def theirs(renderer, path: Path, eye, target):
+    far = float(np.linalg.norm(target - eye))
+    scene, camera = renderer.create_scene(), renderer.create_camera()
+    scene.load(str(path))
+    camera.set_perspective(fov_y_deg=FOV, near=far * 0.01, far=far * 10)
+    camera.position, scene.background = eye.tolist(), (0, 0, 0, 1)
+    camera.look_at(target.tolist())
+    scene.camera = camera
+    image = renderer.create_render_target(width=SIZE, height=SIZE)
+    renderer.render(scene, image)
+    return np.asarray(image.read())[..., :3].astype(np.float64)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_enlarged_pictures_are_those_of_filament(tmp_path, filament, name):
+    file = GltfFile(extensionsUsed=["KHR_materials_unlit", "KHR_texture_transform"])
+    FILES[name](file)
+    file.add("scenes", nodes=list(range(len(file.json["nodes"]))))
+    path = file.write(tmp_path / f"{name}.glb")
+    scene = load_scene(path)
+    low, high = scene.vertices.min(axis=0), scene.vertices.max(axis=0)
+    target, size = (low + high) / 2, np.linalg.norm(high - low)
+    eye = target + size * 1.3 * np.array([0.25, 0.3, 0.92])
+    linear = ours(path, eye, target, tmp_path)
+    shown = linear[..., 3] > 0
+    light = linear[..., :3]
+    encoded = np.where(
+        light <= 0.0031308, light * 12.92, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055
+    )
+    other = theirs(filament, path, eye, target)
+    inner = shown.copy()
+    for dx in (-1, 0, 1):
+        for dy in (-1, 0, 1):
+            inner &= np.roll(shown, (dy, dx), (0, 1))
+    error = np.abs(encoded * 255 - other).max(axis=-1)
+    assert np.quantile(error[inner], 0.99) < 1
+    assert np.count_nonzero((other.max(axis=-1) > 0) != shown) <= 0.003 * shown.size
