@@ -9,7 +9,7 @@ SEEN := out/demo/pictures
 DOCS := docs/pictures
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo pictures test test-long fuzz lint types format bench bench-docs packing-table golden schema docs dist clean
+.PHONY: help env demo pictures test test-long fuzz lint types format bench bench-docs packing-table surfaces golden schema docs dist clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -48,6 +48,9 @@ pictures: env ## make the pictures of the README anew
 	$(QUILT) simulate scenes/demo_sphere.yaml -f 4 -o $(DOCS)/sphere_aside.png --size 960x720 --supersample 3 --from 0.9,0.6,1.0 --edges
 	$(QUILT) simulate scenes/demo.yaml -f 4 -o $(DOCS)/box_third.png --size 960x600 --supersample 3 --third-person
 	$(QUILT) simulate scenes/demo_stereo.yaml -f 6 -o $(DOCS)/stereo-glasses.png --size 720x540 --supersample 3 --glasses half-color
+	$(QUILT) simulate scenes/show_box.yaml -f 9 -o $(DOCS)/show_box.png --size 960x720 --supersample 2
+	$(QUILT) simulate scenes/show_sphere.yaml -f 15 -o $(DOCS)/show_sphere.png --size 960x720 --supersample 2
+	$(QUILT) simulate scenes/show_corner.yaml -f 12 -o $(DOCS)/show_corner.png --size 960x720 --supersample 2
 	$(QUILT) render scenes/demo.yaml -f 6 --overwrite
 	$(QUILT) preview out/demo/quilt/page_01.0006.exr -o $(DOCS)/box_quilt.png
 	$(QUILT) simulate scenes/demo_hall.yaml -f 1 -o $(DOCS)/textures.png --size 720x480 --supersample 3
@@ -63,7 +66,13 @@ pictures: env ## make the pictures of the README anew
 	rm -rf out/lab && $(QUILT) new cave -o out/lab --size 3x3x3m --pixels 512x512
 	$(QUILT) simulate out/lab/job.yaml -f 1 -o $(DOCS)/cave-lab.png --third-person --from 2.6,3.4,5.2 --size 640x400 --supersample 3
 	$(PY) docs/pictures/reduce.py $(DOCS)/wall-*.png $(DOCS)/cave-lab.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png
+	$(PY) -m tests.benchmarks.halftones --write docs/halftones.md --picture $(DOCS)/halftones.png
+	$(PY) docs/pictures/lightfield.py $(DOCS)/lightfield.png
+	$(QUILT) render scenes/demo.yaml -f 3 --overwrite --set output.channels='[rgba,Z,motion,cryptoobject]' --set render.samples=16
+	$(PY) docs/pictures/channels.py out/demo/facets/facet_0001.0003.exr -o $(DOCS)/channels.png
+	$(PY) docs/pictures/motion_blur.py -o $(DOCS)/motion-blur.png
+	$(PY) docs/pictures/transparency.py -o $(DOCS)/transparency.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png $(DOCS)/show_*.png
 
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2
@@ -94,6 +103,10 @@ bench-docs: env ## the same, and put the tables and pictures into docs/performan
 
 packing-table: env ## pack every display by every method and write the tables of docs/packing.md
 	$(PY) -m tests.benchmarks.packing --write docs/packing.md
+
+surfaces: env ## measure curved displays, and put tables and pictures into docs/surfaces.md
+	$(PY) -m tests.benchmarks.surfaces --docs
+	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
 	$(PY) -m pytest tests/system/test_golden.py --update-golden

@@ -6,7 +6,8 @@ Every mesh is in metres with Y up, its faces wound counter-clockwise seen from t
 its display file, all planar: quads where a shape has planar quads, else triangles, and a pentagon
 or decagon where that is the piece of screen. The same program always writes the same bytes.
 
-To add a shape, write a function in `shapes.py` that returns a `Mesh` and add a row to `MODELS`.
+To add a shape, write a function in `shapes.py` that returns a `Mesh` and add a row to `MODELS`; what needs no
+mesh is a row of `CURVED`.
 """
 
 from __future__ import annotations
@@ -102,6 +103,41 @@ MODELS = {
 }
 
 
+CURVED = {
+    "sphere": (
+        "an LED sphere of 1 m radius on the ground, to walk around",
+        "surfaces:\n- {name: sphere, kind: sphere, radius: 1, at: [0, 1, 0], pixels: [4096, 2048]}\n",
+    ),
+    "cylinder_wall": (
+        "an LED wall of 120 degrees and 3 m, 5 m away from whoever stands over the origin and looks along -Z",
+        "surfaces:\n- name: wall\n  kind: cylinder\n  radius: 5\n  height: 3\n  arc_deg: [120, 240]\n"
+        "  lit: inside\n  at: [0, 1.5, 0]\n  pixels: [5120, 1440]\n",
+    ),
+    "dome": (
+        "a dome of 5 m radius, 1 m above the ground, seen from inside",
+        "surfaces:\n- {name: dome, kind: sphere, radius: 5, zenith_deg: [0, 90], lit: inside, at: [0, 1, 0],"
+        " pixels: [4096, 1024]}\n",
+    ),
+    "paraboloid": (
+        "a bowl over a square of 2 m, y = x² + z², looked into from above",
+        "surfaces:\n- {name: bowl, kind: paraboloid, half_width: 1, coefficient: 1, lit: above,"
+        " pixels: [2048, 2048]}\n",
+    ),
+    "bezier_panel": (
+        "a bent panel of 3 m that faces +Z, a Bézier patch of 4 × 3 points",
+        "surfaces:\n- name: panel\n  kind: bezier\n  pixels: [3072, 1536]\n  points:\n"
+        "  - [[-1.5, 2.2, 0.5], [-0.6, 2.0, -0.6], [0.6, 2.4, 0.6], [1.5, 2.2, -0.2]]\n"
+        "  - [[-1.5, 1.4, 0.2], [-0.6, 1.3, -0.9], [0.6, 1.5, 0.9], [1.5, 1.4, 0.1]]\n"
+        "  - [[-1.5, 0.6, 0.5], [-0.6, 0.4, -0.6], [0.6, 0.8, 0.6], [1.5, 0.6, -0.2]]\n",
+    ),
+    "panorama160": (
+        "a panorama of 160 flat strips around the eye (Lorenz and Döllner); without pieces it is round",
+        "projection: {kind: cylinder, pieces: 160, pixels: [1600, 1200]}\n",
+    ),
+}
+"""Displays that need no mesh: their titles, and what their files say."""
+
+
 def obj_text(name: str) -> str:
     """A model's mesh as OBJ."""
     mesh = MODELS[name].make()
@@ -120,12 +156,21 @@ def display_text(name: str) -> str:
     return f"{SCHEMA}# {name}: {model.title}\nquilt_display: 1\nmesh: {name}.obj\n{model.settings}"
 
 
+def curved_text(name: str) -> str:
+    """The display file of a display that needs no mesh."""
+    title, body = CURVED[name]
+    return f"{SCHEMA}# {name}: {title}\nquilt_display: 1\n{body}"
+
+
 def write(folder: Path, names: Iterable[str]) -> None:
     """Write models into a folder."""
     for name in names:
+        if name in CURVED:
+            (folder / f"{name}.yaml").write_text(curved_text(name), encoding="utf-8")
+            continue
         (folder / f"{name}.obj").write_text(obj_text(name), encoding="utf-8")
         (folder / f"{name}.yaml").write_text(display_text(name), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    write(Path(__file__).parent, sys.argv[1:] or MODELS)
+    write(Path(__file__).parent, sys.argv[1:] or [*MODELS, *CURVED])

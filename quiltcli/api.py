@@ -23,15 +23,17 @@ from numpy.typing import NDArray
 
 from quiltcli.display import Facets, load_display
 from quiltcli.errors import JobError, QuiltError
-from quiltcli.formats.exr.image import Image, read_exr
+from quiltcli.formats.exr.image import Image
 from quiltcli.images.facets import facet_image, page_of
+from quiltcli.images.layers import read_view
 from quiltcli.images.preview import tone_map, write_png
 from quiltcli.job import JobFile, load_display_file, load_job, pack_spec
 from quiltcli.job.shipped import shipped
 from quiltcli.layout import Layout, read_layout, write_layout
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.crew import default_threads
-from quiltcli.render.methods import draw_view
+from quiltcli.render.methods import draw_moment
+from quiltcli.render.moments import moment
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.sequence import RenderOptions
 from quiltcli.render.sequence import render as render_job
@@ -175,7 +177,7 @@ def draw(what: Setup | Job, frames: Iterable[int] | None = None, *, threads: int
     views = setup.views(job.frames if frames is None else frames)
     for view in views:
         buffers = new_buffers(setup)
-        record = draw_view(setup.at(view.time), view, buffers, threads or default_threads())
+        record = draw_moment(moment(setup, view), buffers, threads or default_threads())
         pages = tuple(
             {name: page_of(flat, setup.layout, page) for name, flat in buffers.items()}
             for page in range(len(setup.layout.pages))
@@ -184,12 +186,12 @@ def draw(what: Setup | Job, frames: Iterable[int] | None = None, *, threads: int
 
 
 def read_image(path: Path | str) -> Image:
-    """An EXR file of one part: its `channels` (H, W) by name and its `attributes`.
+    """An EXR file of one part, or of parts by channel: its `channels` (H, W) by name and its `attributes`.
 
     Raises:
         OutputError: it cannot be read.
     """
-    return read_exr(Path(path))
+    return read_view(Path(path))
 
 
 def write_picture(path: Path | str, rgb: Pixels, view: str = "aces", exposure: float = 0.0) -> None:

@@ -30,12 +30,23 @@ class Channel:
         dtype: their pixel type.
         empty: value of a pixel that sees nothing.
         averaged: whether it is light, the mean of a pixel's samples; others are the pixel's centre's.
+        matte: whether it is a Cryptomatte: what the samples see, and how many of them see it.
     """
 
     layers: tuple[str, ...]
     dtype: np.dtype[Any]
     empty: float = 0.0
     averaged: bool = False
+    matte: bool = False
+
+
+RANKS = 6
+"""Pairs of identity and coverage that a Cryptomatte holds for a pixel, two to an image of four channels."""
+
+
+def _matte(name: str) -> Channel:
+    layers = tuple(f"{name}{image:02d}.{channel}" for image in range(RANKS // 2) for channel in "RGBA")
+    return Channel(layers, _FLOAT, matte=True)
 
 
 # A pixel that sees nothing is infinitely far in `zv` as well as in `Z`, so that it cannot be taken for
@@ -55,6 +66,9 @@ CHANNELS: Mapping[str, Channel] = MappingProxyType(
         "diffuse": Channel(("diffuse.R", "diffuse.G", "diffuse.B"), _HALF, averaged=True),
         "specular": Channel(("specular.R", "specular.G", "specular.B"), _HALF, averaged=True),
         "emission": Channel(("emission.R", "emission.G", "emission.B"), _HALF, averaged=True),
+        "motion": Channel(("motion.X", "motion.Y"), _FLOAT),
+        "cryptoobject": _matte("CryptoObject"),
+        "cryptomaterial": _matte("CryptoMaterial"),
     }
 )
 

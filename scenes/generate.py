@@ -40,6 +40,15 @@ PALETTE = {
     "sage": (0.19, 0.29, 0.21),
     "clay": (0.46, 0.19, 0.105),
     "dusk": (0.085, 0.14, 0.25),
+    "street": (0.16, 0.16, 0.17),
+} | {
+    # The quarters of the city.
+    f"quarter{k:02d}": (
+        round(0.34 + 0.22 * math.cos(k * 2.4), 3),
+        round(0.33 + 0.18 * math.cos(k * 2.4 + 2.1), 3),
+        round(0.34 + 0.22 * math.cos(k * 2.4 + 4.2), 3),
+    )
+    for k in range(13)
 }
 
 # Materials of pictures, which pictures.py draws.
@@ -185,6 +194,48 @@ def plate() -> Mesh:
     return mesh
 
 
+def mosaic() -> CoveredMesh:
+    """A round floor 1 m wide at height 0, one polygon; a picture lies on it as seen from above."""
+    mesh = CoveredMesh()
+    turns = [2 * math.pi * k / 64 for k in range(64)]
+    places = [(0.5 * math.cos(t), 0.5 * math.sin(t)) for t in turns]
+    first = mesh.add_points([(x, 0, -y) for x, y in places])
+    mesh.faces.append(tuple(range(first, first + 64)))
+    mesh.places.append([(x + 0.5, y + 0.5) for x, y in places])
+    return mesh
+
+
+def pavilion() -> Mesh:
+    """Eight columns under a ring, on a round step below height 0; 1 m wide, 0.62 m high, for `mosaic`."""
+    mesh = Mesh()
+    paint(mesh, "chalk")
+    turn(mesh, [(0, -0.05), (0.49, -0.05), (0.5, -0.04), (0.5, 0)], 64)
+    column = [
+        (0.045, 0),
+        (0.045, 0.02),
+        (0.03, 0.03),
+        (0.024, 0.44),
+        (0.024, 0.46),
+        (0.042, 0.47),
+        (0.042, 0.49),
+    ]
+    for k in range(8):
+        angle = 2 * math.pi * (k + 0.5) / 8
+        turn(mesh, [(0, 0), *column, (0, 0.49)], 20, (0.43 * math.cos(angle), 0.43 * math.sin(angle)))
+    ring = [(0.37, 0.49), (0.49, 0.49), (0.49, 0.53), (0.5, 0.54), (0.5, 0.57), (0.38, 0.57), (0.37, 0.56)]
+    turn(mesh, [*ring, ring[0]], 64)
+    return mesh
+
+
+def turn(
+    mesh: Mesh, profile: list[tuple[float, float]], sides: int, at: tuple[float, float] = (0, 0)
+) -> None:
+    """Add what a profile makes around an upright axis at a place."""
+    part = revolved(profile, sides)
+    first = mesh.add_points([(x + at[0], y, z + at[1]) for x, y, z in part.vertices])
+    mesh.faces += [tuple(first + corner for corner in face) for face in part.faces]
+
+
 def room() -> Mesh:
     """A room of 6 m × 6 m, 3.2 m high, seen from inside: tiled floor, coloured walls, a beamed ceiling."""
     mesh = Mesh()
@@ -221,6 +272,40 @@ def table() -> Mesh:
     return mesh
 
 
+def city() -> Mesh:
+    """A city of 3,499 blocks on 600 m × 600 m around a square: 35,000 triangles in 14 groups.
+
+    As many as the city of Lorenz and Döllner's paper has; heights and sides are pseudo-random, to 0.1 m.
+    """
+    mesh, state = Mesh(), 18
+
+    def chance() -> float:
+        nonlocal state
+        state = (state * 1103515245 + 12345) % 2**31
+        return state / 2**31
+
+    lots = [(i, j) for i in range(-30, 30) for j in range(-30, 30) if i * i + j * j + i + j > 30]
+    lots.sort(key=lambda lot: (13 * (math.atan2(lot[1] + 0.5, lot[0] + 0.5) + math.pi) // (2 * math.pi), lot))
+    paint(mesh, "street")
+    for k in range(5):
+        z0, z1 = -300.0 + 120 * k, -180.0 + 120 * k
+        grid(mesh, np.array([[(-300.0, 0, z1), (300.0, 0, z1)], [(-300.0, 0, z0), (300.0, 0, z0)]]))
+    for i, j in lots[:3499]:
+        quarter = int(13 * (math.atan2(j + 0.5, i + 0.5) + math.pi) // (2 * math.pi)) % 13
+        paint(mesh, f"quarter{quarter:02d}")
+        wide, deep = (round(3 + 4.5 * chance(), 1) for _ in range(2))
+        near = 1 - math.hypot(i, j) / 42
+        high = round(3 + 9 * chance() + 60 * max(near, 0) ** 2 * chance() ** 3, 1)
+        x, z = round(10 * i + 1.2 + 0.8 * chance(), 1), round(10 * j + 1.2 + 0.8 * chance(), 1)
+        south, north = round(z + deep, 1), z
+        west, east = x, round(x + wide, 1)
+        ring = [(west, south), (east, south), (east, north), (west, north)]
+        first = mesh.add_points([(u, v, w) for v in (0, high) for u, w in ring])
+        walls = [(k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4) for k in range(4)]
+        mesh.faces += [tuple(first + k for k in face) for face in (*walls, (4, 5, 6, 7))]
+    return mesh
+
+
 def hall() -> CoveredMesh:
     """A hall of 6 m × 6 m, 3.2 m high, seen from inside: tiles, brick walls and two brick pillars."""
     mesh = CoveredMesh()
@@ -254,9 +339,12 @@ MESHES: dict[str, Callable[[], Mesh]] = {
     "board": board,
     "dish": dish,
     "plate": plate,
+    "mosaic": mosaic,
+    "pavilion": pavilion,
     "hall": hall,
     "room": room,
     "table": table,
+    "city": city,
 }
 
 

@@ -17,6 +17,7 @@ from quiltcli.analysis.delivery import delivery_problems
 from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
 from quiltcli.display.check import called
+from quiltcli.display.clicks import calibrate
 from quiltcli.display.notices import display_notices
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
@@ -29,21 +30,33 @@ from quiltcli.job import (
     SceneFile,
     check_file,
     file_kind,
+    load_calibration_file,
     load_display_file,
+    load_job,
+    load_lightfield_file,
     load_scene_file,
 )
 from quiltcli.job.layout_table import LayoutTable, read_layout_table
+from quiltcli.job.load import load_mirror_file
+from quiltcli.job.mirror import is_mirror
 from quiltcli.job.model import attach
-from quiltcli.layout import align, read_layout
+from quiltcli.layout import Layout, align, read_layout
 from quiltcli.layout.from_job import layout_for
-from quiltcli.render.needs import demand_memory
+from quiltcli.lightfield import load_field
+from quiltcli.render.needs import demand_memory, method_problems
 from quiltcli.render.notices import job_warnings
+from quiltcli.render.ring.setup import notices as ring_notices
+from quiltcli.render.ring.setup import set_ring_stage
 from quiltcli.render.setup import facets_and_layout, texture_limits
+from quiltcli.render.unseen import unseen_notices
+from quiltcli.ring.build import rig_of
 from quiltcli.scene import Scene, load_scene
 from quiltcli.scene.motion import load_moving_scene
+from quiltcli.scene.source import SceneSource
 from quiltcli.scene.textures.pool import check_textures
-from quiltcli.viewer.clip import their_lit_facets
-from quiltcli.viewer.view import facet_problems, view_problems, viewers_of
+from quiltcli.shading.lights import demand_shadows
+from quiltcli.viewer.clip import settled_clip, their_lit_facets
+from quiltcli.viewer.view import View, facet_problems, view_problems, viewers_of, views_of
 
 T = TypeVar("T")
 _MOST_FRAMES = 1000  # looked at for facets that are always dark
@@ -109,19 +122,26 @@ class _Findings:
             if isinstance(name, str) and is_regular(path.parent / name):
                 self.check(path.parent / name)
 
-    def scene(self, path: Path, spec: SceneFile | Path | None, job: JobFile | None = None) -> Scene | None:
+    def scene(
+        self, path: Path, spec: SceneFile | Path | None, job: JobFile | None = None
+    ) -> tuple[Scene | None, SceneSource | None]:
         """Load a scene, and note what it has to say, and what it lacks in a job's frames."""
+        source = None
         if job is None or not isinstance(spec, SceneFile):
             scene = self.run(load_scene, spec)
         else:
             scene, source = self.run(load_moving_scene, spec, float(job.fps)) or (None, None)
-            self.problems += source.problems(job.frames) if source is not None else ()
+            lacking = list(source.problems(job.frames)) if source is not None else []
+            self.problems += lacking
+            source = None if lacking else source
             if scene is not None:
                 drawn = (texture for textures in scene.materials.textures for texture in textures)
                 self.run(check_textures, drawn, texture_limits(job))
+            if scene is not None and job.render.shadows:
+                self.run(demand_shadows, scene)
         if scene is not None:
             self.notices += [f"{path}: {notice}" for notice in scene.notices]
-        return scene
+        return scene, source
 
     def facets(self, path: Path) -> Facets | None:
         """The facets of a display file, built once."""
@@ -133,6 +153,11 @@ class _Findings:
 
 
 def _check_display(findings: _Findings, path: Path) -> None:
+    if is_mirror(parse_yaml(path).data):
+        display = load_mirror_file(path)
+        findings.run(rig_of, display)
+        findings.notices += [f"{path}: {notice}" for notice in display.timing.notices()]
+        return
     facets = findings.facets(path)
     own = load_display_file(path).layout
     if own is not None:
@@ -166,6 +191,9 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if job is None:
         findings.named_in(path)
         return
+    if job.ring is not None:
+        _check_ring(findings, path)
+        return
     found = view_problems(job, job.frames)
     findings.problems += found
     facets = findings.facets(job.display)
@@ -183,11 +211,29 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if facets is None and isinstance(choice, Path):
         findings.run(read_layout, choice)
     if facets is not None:
-        findings.problems += facet_problems(job, facets.count)
-    scene = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
-    if facets is not None and not found:
-        findings.notices += stereo_notices(job, facets, scene)
-        findings.notices += dark_notices(job, facets)
+        findings.problems += facet_problems(job, facets.count) + method_problems(job, facets)
+    before = len(findings.problems)
+    scene, source = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
+    if facets is None or found:
+        return
+    findings.notices += stereo_notices(job, facets, scene)
+    findings.notices += dark_notices(job, facets)
+    if len(findings.problems) == before:
+        views = views_of(job, job.frames, settled_clip(job, facets))
+        at = None if scene is None else source.scene_at if source is not None else lambda frame: scene
+        findings.notices += findings.run(lambda: list(_unseen(job, views, facets, placed, at))) or []
+
+
+def _unseen(
+    job: JobFile,
+    views: list[View],
+    facets: Facets,
+    layout: Layout | None,
+    scene_at: Callable[[float], Scene] | None,
+) -> Iterator[str]:
+    """Why views of a job show nothing, as far as it can be said of what is there."""
+    how = job.render
+    yield from unseen_notices(views, facets, layout, scene_at, bleed=how.bleed, culling=how.backface_culling)
 
 
 def dark_notices(job: JobFile, facets: Facets) -> Iterator[str]:
@@ -201,6 +247,25 @@ def dark_notices(job: JobFile, facets: Facets) -> Iterator[str]:
         more = f" and {len(dark) - 5} more" if len(dark) > 5 else ""
         words = "faces away from the viewer" if len(dark) == 1 else "face away from the viewer"
         yield f"facet{'s' * (len(dark) > 1)} {named}{more} {words} in every frame: dark"
+
+
+def _check_ring(findings: _Findings, path: Path) -> None:
+    """A job of a display with a spinning mirror: all that a render looks at before it begins."""
+    stage = findings.run(set_ring_stage, findings.run(load_job, path))
+    if stage is not None:
+        own = (f"{stage.job.scene}: {notice}" for notice in stage.scene.notices)
+        findings.notices += [*own, *ring_notices(stage)]
+
+
+def _check_calibration(findings: _Findings, path: Path) -> None:
+    findings.run(calibrate, findings.run(load_calibration_file, path))
+
+
+def _check_lightfield(findings: _Findings, path: Path) -> None:
+    file = findings.run(load_lightfield_file, path)
+    # Of what moves, the job says the frames.
+    frames = () if file is not None and file.is_animated else (1,)
+    findings.run(load_field, file, frames)
 
 
 def _job_alone(path: Path) -> JobFile | None:
@@ -219,4 +284,6 @@ CHECKS: dict[str, Callable[[_Findings, Path], None]] = {
     "quilt_layout": _check_layout,
     "quilt_scene": _check_scene,
     "quilt_job": _check_job,
+    "quilt_lightfield": _check_lightfield,
+    "quilt_calibration": _check_calibration,
 }

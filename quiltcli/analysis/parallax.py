@@ -21,6 +21,7 @@ from quiltcli.viewer.viewer import Viewer
 
 LEAST_SEPARATION, MOST_SEPARATION = 0.040, 0.080
 """Metres: what people's eyes are apart."""
+_ALONG = 1e-12
 _MOST_POINTS, _MOST_FRAMES = 4000, 12
 
 
@@ -64,11 +65,12 @@ def facet_parallax(
     for eye in (left, right):
         ray = points - eye
         slope = dot(ray, normal)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = dot(origin - eye, normal) / slope
-            at = eye + t[:, None] * ray
-            x, y = (dot(at - origin, step) / dot(step, step) for step in (du, dv))
-            inside &= (t > 0) & (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
+        # A ray along the facet's plane meets it nowhere: it stays at the eye, with t = 0.
+        meets = np.abs(slope) > _ALONG * np.sqrt(dot(ray, ray))
+        t = np.divide(dot(origin - eye, normal), slope, out=np.zeros_like(slope), where=meets)
+        at = eye + t[:, None] * ray
+        x, y = (dot(at - origin, step) / dot(step, step) for step in (du, dv))
+        inside &= (t > 0) & (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
         places.append((at, np.stack((x, y), axis=1)))
     (world_l, pixel_l), (world_r, pixel_r) = places
     return world_r - world_l, pixel_r - pixel_l, inside
@@ -79,7 +81,7 @@ def view_parallax(facets: Facets, scene: Scene, left: Viewer, right: Viewer) -> 
     step = -(-len(scene.vertices) // _MOST_POINTS)
     points = scene.vertices[::step]
     found = Parallax()
-    lit = their_lit_facets(facets, left) & their_lit_facets(facets, right)
+    lit = their_lit_facets(facets, left) & their_lit_facets(facets, right) & ~facets.curved
     across = right.eye - left.eye
     for facet in np.flatnonzero(lit).tolist():
         world, pixels, inside = facet_parallax(facets, facet, left.eye, right.eye, points)

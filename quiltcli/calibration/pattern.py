@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quiltcli.calibration.markers import MarkerSet, draw_markers
 from quiltcli.formats.drawing.font import HEIGHT, text_mask, text_width
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.images.facets import facet_image
@@ -37,6 +38,7 @@ class Piece:
         polygon: (n, 2) corners in facet pixels.
         inside: (H, W) pixels that belong to the facet.
         step: pixels between lines of a grid, and a field of a checker.
+        markers: what is on the display, for the pattern `markers`.
     """
 
     facet: int
@@ -45,6 +47,7 @@ class Piece:
     polygon: FloatArray
     inside: BoolArray
     step: int
+    markers: MarkerSet | None = None
 
     @cached_property
     def border(self) -> BoolArray:
@@ -56,20 +59,31 @@ class Piece:
 
 
 def piece(
-    layout: Layout, row: int, owners: NDArray[np.integer[Any]], name: str = "", step: int = 32
+    layout: Layout,
+    row: int,
+    owners: NDArray[np.integer[Any]],
+    name: str = "",
+    step: int = 32,
+    markers: MarkerSet | None = None,
 ) -> Piece:
     """The raster of the facet in this row of the layout; `owners` are `pixel_owners(layout)`."""
     here = facet_image({"id": owners}, layout, row, owners)["id"] == layout.facet[row]
     width, height = layout.size[row]
     polygon = layout.outline(row)
-    return Piece(int(layout.facet[row]), name, (int(width), int(height)), polygon, here, step)
+    return Piece(int(layout.facet[row]), name, (int(width), int(height)), polygon, here, step, markers)
 
 
 def draw(kind: str, piece: Piece) -> Float32Array:
-    """The pattern `kind` (a key of `KINDS`) of a facet, (H, W, 3) float32, 0 to 1, 0 outside the polygon."""
+    """The pattern `kind` (`MARKERS`, or a key of `KINDS`) of a facet, (H, W, 3) float32, 0 to 1.
+
+    Outside the polygon it is 0.
+    """
     width, height = piece.size
     image = np.zeros((height, width, 3), dtype=np.float32)
-    KINDS[kind](piece, image)
+    if kind == MARKERS and piece.markers is not None:
+        draw_markers(piece.markers, piece.facet, image)
+    else:
+        KINDS[kind](piece, image)
     image[~piece.inside] = 0
     return image
 
@@ -139,6 +153,10 @@ KINDS: dict[str, Callable[[Piece, Float32Array], None]] = {
 """Every pattern: what draws it on the (H, W, 3) image of a facet, which starts black."""
 
 
+MARKERS = "markers"
+"""The pattern that a camera reads; it needs the display, and OpenCV for its dictionaries."""
+
+
 def facet_color(facet: int) -> tuple[float, float, float]:
     """A dark colour, far from that of the facets before and after."""
     place = (facet * 0.6180339887) % 1 * len(_HUES)
@@ -199,7 +217,7 @@ def _flag(image: Float32Array, centre: FloatArray, size: float) -> None:
     j, i = np.mgrid[-half : half + 1, -half : half + 1]
     thick = max(half // 8, 0)
     head = j <= -half + 2 * max(half // 3, 1)
-    pole = (np.abs(i) <= thick) | (head & (2 * np.abs(i) <= j + half))
+    pole = np.where(head, 2 * np.abs(i) <= j + half, np.abs(i) <= thick)
     pennant = (i > thick) & (i <= half) & (j >= 0) & (j <= max(half // 2, 1))
     _stamp(image, pole, centre, WHITE)
     _stamp(image, pennant, centre, RED)

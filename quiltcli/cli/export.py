@@ -17,7 +17,7 @@ from quiltcli.cli.printing import print_files
     "--format",
     "format_name",
     type=MAP_FORMAT,
-    help="obj, csv, json, mpcdi, mpcdi1, st, png or svg, whatever the suffix.",
+    help="obj, csv, json, mpcdi, mpcdi1, st, png or svg, whatever the suffix; of a display xyz, obj or data.",
 )
 @click.option("--display", type=PATH, help="Display file, instead of the one the layout names.")
 def export(layout: Path, output: Path, format_name: str | None, display: Path | None) -> None:
@@ -25,10 +25,20 @@ def export(layout: Path, output: Path, format_name: str | None, display: Path | 
 
     Textured mesh (.obj), table of panels (.csv), JSON (.json), MPCDI (.mpcdi), ST maps (.exr), or a
     template picture (.png, .svg).
+
+    LAYOUT may be a display file: its pixels' points in the world (.exr, .pfm), or a mesh whose texture is its
+    image (.obj); of a projection a warp mesh (.data). A file a facet.
     """
-    from quiltcli.exchange.pixelmaps import known_display, write_map
+    from quiltcli.display import load_display
+    from quiltcli.exchange.pixelmaps import known_display, write_display_map, write_map
+    from quiltcli.job import DisplayFile, file_kind, load_display_file
     from quiltcli.layout import read_layout
 
+    if file_kind(layout) == DisplayFile.kind:
+        facets = load_display(load_display_file(layout))
+        written = write_display_map(facets, output, format_name)
+        print_files(written, written[-1].parent)
+        return
     loaded = read_layout(layout)
     written = write_map(loaded, known_display(loaded, display), output, format_name)
     print_files(written, written[-1].parent)

@@ -13,12 +13,15 @@ from quiltcli.errors import QuiltError
 
 COMMANDS = (
     "assemble",
+    "calibrate",
     "cameras",
+    "capture",
     "check",
     "compare",
     "contact",
     "diff",
     "export",
+    "facet",
     "farm",
     "film",
     "import",
@@ -35,6 +38,7 @@ COMMANDS = (
     "stereo",
     "sweetspot",
     "unmap",
+    "unpack",
     "verify",
     "view",
 )

@@ -64,10 +64,20 @@ def _frames(text: str) -> tuple[int, ...]:
     return parse_frames(text)
 
 
-def _facets(text: str) -> tuple[int, ...]:
+def _facets(text: str) -> tuple[int, ...] | str:
     from quiltcli.job.frames import parse_facets
 
-    return parse_facets(text)
+    # Names are known when the display is.
+    return text if any(letter.isalpha() for letter in text) else parse_facets(text)
+
+
+def _positions(text: str) -> tuple[int, ...]:
+    from quiltcli.job.frames import parse_frames
+
+    try:
+        return parse_frames(text)
+    except JobError as error:
+        raise JobError(error.problems[0].message.replace("frame", "position")) from None
 
 
 def _size(text: str) -> tuple[int, int] | None:
@@ -103,6 +113,26 @@ def _point(text: str) -> tuple[float, ...]:
     return point
 
 
+def _numbers(text: str, count: int, what: str) -> tuple[float, ...]:
+    try:
+        found = tuple(map(float, text.split(",")))
+    except ValueError:
+        found = ()
+    if len(found) != count or not all(abs(value) < float("inf") for value in found):
+        raise JobError(f"expected {what}, got {text!r}")
+    return found
+
+
+def _pair(text: str) -> tuple[float, ...]:
+    return _numbers(text, 2, "two numbers, such as 0.02,0")
+
+
+def _eye(text: str) -> str | tuple[float, ...]:
+    if text in ("left", "right"):
+        return text
+    return _numbers(text, 3, "left, right, or an azimuth, height and distance such as 40,0.4,1")
+
+
 def _area(text: str) -> tuple[float, ...]:
     try:
         area = tuple(map(float, text.split(",")))
@@ -132,9 +162,9 @@ def _map_formats() -> Iterable[str]:
 
 
 def _patterns() -> Iterable[str]:
-    from quiltcli.calibration.pattern import KINDS
+    from quiltcli.calibration.pattern import KINDS, MARKERS
 
-    return (*KINDS, "all")
+    return (*KINDS, MARKERS, "all")
 
 
 def _job_keys() -> Iterable[str]:
@@ -145,9 +175,12 @@ def _job_keys() -> Iterable[str]:
 
 FRAMES = FarmFrames("frames", _frames)
 FACETS = Parsed("facets", _facets)
+POSITIONS = Parsed("positions", _positions)
 SIZE = Parsed("size", _size)
 ASPECT = Parsed("aspect", _aspect)
 POINT = Parsed("point", _point)
+PAIR = Parsed("pair", _pair)
+EYE = Parsed("eye", _eye)
 AREA = Parsed("area", _area)
 PACKING_METHOD = Words(_packing_methods)
 RENDER_METHOD = Words(_render_methods)

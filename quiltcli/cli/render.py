@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import FACETS, OVERWRITE, PATH, SETS, THREADS, frames_option
+from quiltcli.cli.options import FACETS, OVERWRITE, PATH, POSITIONS, SETS, THREADS, frames_option
 from quiltcli.cli.printing import print_aligned
 
 
@@ -18,7 +18,14 @@ from quiltcli.cli.printing import print_aligned
 @click.option("-o", "--output", type=PATH, help="Output folder, instead of the job's.")
 @click.option("--resume", is_flag=True, help="Skip frames that are complete and made by the same job.")
 @OVERWRITE
-@click.option("--facets", type=FACETS, help="Draw only these facets, such as 3,7-9, into existing quilts.")
+@click.option(
+    "--facets", type=FACETS, help="Draw only these facets, such as 3,7-9 or left,right, into existing quilts."
+)
+@click.option(
+    "--positions",
+    type=POSITIONS,
+    help="Draw only these mirror positions of a 360° light field display, such as 1-72 or 1-288x12.",
+)
 @THREADS
 @click.option(
     "--scheduler",
@@ -45,7 +52,8 @@ def render(
     output: Path | None,
     resume: bool,
     overwrite: bool,
-    facets: tuple[int, ...] | None,
+    facets: tuple[int, ...] | str | None,
+    positions: tuple[int, ...] | None,
     threads: int | None,
     scheduler: str | None,
     progress: str,
@@ -68,10 +76,28 @@ def render(
         limit_memory(read_bytes(memory))
     if scale is not None:
         sets = (*sets, f"render.scale={scale}")
-    options = RenderOptions(frames, output, resume, overwrite, facets, threads or 0, dry_run, strict)
-    records = _render(load_job(job, sets), options, scheduler, progress)
+    loaded = load_job(job, sets)
+    if loaded.ring is not None:
+        if facets is not None or scheduler is not None:
+            raise click.UsageError("--facets and --scheduler are not for 360° light field displays")
+        _render_turns(loaded, frames, output, positions, resume, overwrite, threads or 0, dry_run, profile)
+        return
+    if positions is not None:
+        raise click.UsageError("--positions are a 360° light field display's, and this job's has facets")
+    ids = _named(loaded, facets) if isinstance(facets, str) else facets
+    options = RenderOptions(frames, output, resume, overwrite, ids, threads or 0, dry_run, strict)
+    records = _render(loaded, options, scheduler, progress)
     if profile and records:
         _print_profile(records)
+
+
+def _named(job: Any, text: str) -> tuple[int, ...]:
+    """Ids of facets that are given by name."""
+    from quiltcli.display import load_display
+    from quiltcli.display.named import facet_ids
+    from quiltcli.job import load_display_file
+
+    return facet_ids(text, load_display(load_display_file(job.display)).names)
 
 
 def _render(job: Any, options: Any, scheduler: str | None, form: str) -> Any:
@@ -94,6 +120,33 @@ def _render(job: Any, options: Any, scheduler: str | None, form: str) -> Any:
     else:
         click.echo("every frame is complete already")
     return records
+
+
+def _render_turns(job: Any, *how: Any) -> None:
+    """Render turns of a spinning mirror, with a line a frame on stderr."""
+    from quiltcli.render.interrupt import Stopped
+    from quiltcli.render.ring.walk import RingOptions, render_turns
+
+    frames, output, positions, resume, overwrite, threads, dry_run, profile = how
+    options = RingOptions(frames, output, positions, resume, overwrite, threads, dry_run)
+    try:
+        records = render_turns(job, options, lambda words: click.echo(words, err=True))
+    except Stopped as stopped:
+        click.echo(str(stopped), err=True)
+        sys.exit(stopped.exit_code)
+    if dry_run:
+        click.echo("nothing is wrong with this job")
+    elif not records:
+        click.echo("every frame is complete already")
+    else:
+        click.echo(f"written to {output or job.output.directory}")
+    for record in records if profile else ():
+        click.echo(f"frame {record.frame}: seconds by stage, then those of all workers by what they did")
+        rows = [
+            *record.seconds.items(),
+            *((f"  {name}", each) for name, each in record.counts.seconds.items()),
+        ]
+        print_aligned(("stage", "seconds"), [(name, f"{each:.3f}") for name, each in rows])
 
 
 def _print_profile(records: Any) -> None:

@@ -10,7 +10,7 @@ from quiltcli.cli.options import PATH
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(("job", "display", "layout", "scene")))
+@click.argument("kind", type=click.Choice(("job", "display", "layout", "scene", "lightfield", "calibration")))
 @click.option("-o", "--output", type=PATH, help="File to write, instead of stdout.")
 def schema(kind: str, output: Path | None) -> None:
     """Print the JSON Schema of files of a KIND, by which editors check YAML while it is typed.

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, PATH, POINT, SETS, SIZE, THREADS, VIEW, frames_option
+from quiltcli.cli.options import EXPOSURE, EYE, PAIR, PATH, POINT, SETS, SIZE, THREADS, VIEW, frames_option
 from quiltcli.cli.stereo import MATRICES
 
 
@@ -36,12 +36,28 @@ from quiltcli.cli.stereo import MATRICES
     default=None,
     help="From the eye, compare with a direct picture; not for a film alone.",
 )
-@click.option("--eye", type=click.Choice(("left", "right")), help="One eye of two; both by default.")
+@click.option(
+    "--eye",
+    type=EYE,
+    metavar="left|right|AZ,H,D",
+    help="One eye of two; both by default. On a ring, azimuth in degrees, height and distance in metres.",
+)
 @click.option("--glasses", type=click.Choice(MATRICES), help="Both eyes' pictures as one anaglyph.")
 @click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
 @click.option("--direct", type=PATH, help="Write the direct picture, as PNG.")
 @click.option("--heat-map", type=PATH, help="Write a picture of the errors, as PNG.")
 @click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")
+@click.option(
+    "--content",
+    type=click.Choice(("mcop", "perspective", "diffuse")),
+    default="mcop",
+    help="On a ring: what the mirror shows, to compare with the exact map (mcop).",
+)
+@click.option("--tones", is_flag=True, help="On a ring: tones, not bits.")
+@click.option("--slices", is_flag=True, help="On a ring: alternate mirror positions dark and bright.")
+@click.option("--photometric", is_flag=True, help="On a ring: leave gaps between mirror positions dark.")
+@click.option("--aperture", type=PAIR, metavar="W,H", help="On a ring: a camera's opening, metres.")
+@click.option("--focus", type=float, help="On a ring: where such a camera is sharp; the axis by default.")
 @EXPOSURE
 @THREADS
 @SETS
@@ -65,9 +81,45 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
     if how["size"] is None:
         raise click.UsageError("--size: a picture needs a width and a height")
     samples, threads = how.pop("supersample"), how.pop("threads") or 0
-    options = PictureOptions(samples=samples, threads=threads, resampled=True, **how)
     loaded = load_job(job, sets)
+    ring = {
+        name: how.pop(name) for name in ("content", "tones", "slices", "photometric", "aperture", "focus")
+    }
+    if loaded.ring is not None:
+        _around(loaded, frames or loaded.frames[:1], pictures, {**ring, **how})
+        return
+    if ring != _RING:
+        raise click.UsageError("--content, --tones, --slices, --aperture, --focus are for rings of viewers")
+    if isinstance(how["eye"], tuple):
+        raise click.UsageError("--eye: expected left or right, for the viewers of this job are no ring")
+    options = PictureOptions(samples=samples, threads=threads, resampled=True, **how)
     for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures, _note):
+        click.echo(line)
+
+
+_RING = {
+    "content": "mcop",
+    "tones": False,
+    "slices": False,
+    "photometric": False,
+    "aperture": None,
+    "focus": None,
+}
+
+
+def _around(job: Any, frames: Any, pictures: Any, how: dict[str, Any]) -> None:
+    """Look at a spinning mirror from one place, or from where the ring and every user are."""
+    from quiltcli.analysis.ring.files import write_eye_pictures
+    from quiltcli.analysis.ring.simulate import EyeOptions
+
+    if pictures.picture is None or pictures.video is not None:
+        raise click.UsageError("give -o PICTURE.png (a film of a ring comes from its pictures)")
+    eye = how["eye"] or None
+    if isinstance(eye, str):
+        raise click.UsageError("--eye: expected AZIMUTH,HEIGHT,DISTANCE on a ring of viewers")
+    names = ("content", "tones", "slices", "photometric", "aperture", "focus", "size")
+    options = EyeOptions(eye=eye, **{name: how[name] for name in names})
+    for line in write_eye_pictures(job, frames, options, pictures):
         click.echo(line)
 
 

@@ -8,6 +8,7 @@ import click
 
 from quiltcli.cli.options import OVERWRITE, PATH, frames_option
 from quiltcli.cli.printing import print_files
+from quiltcli.errors import JobError
 
 MODES = (
     *("anaglyph", "side-by-side", "side-by-side-half", "top-bottom", "top-bottom-half"),
@@ -26,9 +27,7 @@ MATRICES = (
 @click.option(
     "--matrix",
     type=click.Choice(MATRICES),
-    default="dubois-red-cyan",
-    show_default=True,
-    help="Colours of an anaglyph.",
+    help="Colours of an anaglyph.  [default: dubois-red-cyan]",
 )
 @click.option("--of", "kind", type=click.Choice(("pages", "facets")), default="pages", show_default=True)
 @frames_option("Frames; all by default.")
@@ -39,7 +38,7 @@ def stereo(
     out: Path,
     output: Path,
     mode: str,
-    matrix: str,
+    matrix: str | None,
     kind: str,
     frames: tuple[int, ...] | None,
     swap: bool,
@@ -53,6 +52,9 @@ def stereo(
     """
     from quiltcli.images.stereo.files import StereoOptions, write_stereo
 
-    options = StereoOptions(mode, kind.removesuffix("s"), frames, matrix, swap, sync_line, overwrite)
+    if matrix is not None and mode != "anaglyph":
+        raise JobError(f"--matrix goes with --as anaglyph, not with {mode}")
+    colors = matrix or "dubois-red-cyan"
+    options = StereoOptions(mode, kind.removesuffix("s"), frames, colors, swap, sync_line, overwrite)
     written = write_stereo(out, output, options)
     print_files(written, output)

@@ -43,9 +43,13 @@ def verify(
     from quiltcli.analysis.verify.picture import write_picture
     from quiltcli.job import load_job
 
+    loaded = load_job(job, sets)
+    if loaded.ring is not None:
+        _verify_turn(loaded, (frame, everything, pixels, output, redraw), as_json)
+        return
     options = VerifyOptions(frame, everything, pixels or SAMPLE, output, redraw, threads or 0, eye or "")
     verdicts = []
-    for found in verify_frame(load_job(job, sets), options):
+    for found in verify_frame(loaded, options):
         verdicts.append(found.verdict)
         if as_json != Path("-"):
             _print_verdict(found.verdict)
@@ -56,6 +60,22 @@ def verify(
     if as_json is not None:
         _write_json(verdicts, as_json)
     if not all(verdict.passed for verdict in verdicts):
+        sys.exit(1)
+
+
+def _verify_turn(job: Any, how: tuple[Any, ...], as_json: Path | None) -> None:
+    """Verify a turn of a spinning mirror."""
+    from quiltcli.analysis.ring.verify import COLUMNS, SAMPLE, RingVerifyOptions, verify_turn
+
+    frame, everything, pixels, output, redraw = how
+    verdict = verify_turn(job, RingVerifyOptions(frame, everything, pixels or SAMPLE, output, redraw))
+    if as_json != Path("-"):
+        print_aligned(COLUMNS, verdict.rows())
+        words = "nothing is wrong" if verdict.passed else "FAILED"
+        click.echo(f"frame {verdict.frame}, {verdict.source}, {verdict.positions} positions: {words}")
+    if as_json is not None:
+        _write_json([verdict], as_json)
+    if not verdict.passed:
         sys.exit(1)
 
 

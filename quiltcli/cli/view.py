@@ -43,7 +43,17 @@ def view(out: Path, frames: tuple[int, ...] | None, output: Path | None, **how: 
 
     The page is one file that opens in any browser and needs no network: the display with its images on,
     from the viewer's eye and from everywhere else, with the scene as a ghost of at most so many triangles.
+    Of a 360° light field display: what an eye sees from all around, as it turns.
     """
+    from quiltcli.images.turns import is_ring_output
+
+    if is_ring_output(out):
+        from quiltcli.exchange.web.turning import Turning, turning_view
+
+        wishes = Turning(view=how["view"], exposure=how["exposure"], size_mb=how["size"])
+        page = turning_view(out, frames, output, wishes, lambda line: click.echo(line, err=True))
+        click.echo(f"page      {page}")
+        return
     from quiltcli.exchange.web import ViewOptions
     from quiltcli.exchange.web import view as write_view
 

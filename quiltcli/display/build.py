@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from quiltcli.display.check import called, check_polygons
+from quiltcli.display.curved import joined, projection_facets, surface_facets
 from quiltcli.display.facets import Facets, places_of
 from quiltcli.display.notices import likely_unit
 from quiltcli.display.panels import panel_facets
@@ -29,9 +30,12 @@ def load_display(spec: DisplayFile) -> Facets:
         MeshError: the mesh cannot be read.
         DisplayError: the mesh or the display file makes no facets; every problem found is in it.
     """
-    if spec.mesh is None:
-        return panel_facets(spec)
-    return build_facets(read_mesh(spec.mesh), spec)
+    if spec.projection is not None:
+        return projection_facets(spec)
+    if spec.mesh is None and spec.panels is None:
+        return surface_facets(spec)
+    flat = panel_facets(spec) if spec.mesh is None else build_facets(read_mesh(spec.mesh), spec)
+    return flat if spec.surfaces is None else joined(flat, surface_facets(spec))
 
 
 def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
@@ -57,7 +61,7 @@ def build_facets(mesh: PolygonMesh, spec: DisplayFile) -> Facets:
     right, down = _axes(corners, start, front, normal, spec)
     mirrored = np.array([choice.mirror for choice in chosen])
     right = np.where(mirrored[:, None], -right, right)
-    frame = _rasters(corners, start, right, down, spec)
+    frame = _rasters(corners, start, right, down, mesh, spec)
     extent = float(np.ptp(corners, axis=0).max())
     _raise([*_useless_ups(normal, names, spec), *_impossible_sizes(frame.size, extent, names, spec)], spec)
     return Facets(
@@ -124,16 +128,49 @@ def _axes(
 
 
 def _rasters(
-    corners: FloatArray, start: IntArray, right: FloatArray, down: FloatArray, spec: DisplayFile
+    corners: FloatArray,
+    start: IntArray,
+    right: FloatArray,
+    down: FloatArray,
+    mesh: PolygonMesh,
+    spec: DisplayFile,
 ) -> Rasters:
     asked = np.zeros((len(right), 2), np.int32)
     resolution = spec.resolution
-    assert resolution is not None  # a file with a mesh has one
-    asked[:] = resolution.facet_pixels or 0
+    if resolution is None:
+        density = _texture_density(corners, mesh, spec)
+    else:
+        density = np.full(len(right), resolution.density or 1.0)
+        asked[:] = resolution.facet_pixels or 0
     for facet, choice in spec.facets.items():
         if choice.facet_pixels is not None:
             asked[facet - 1] = choice.facet_pixels
-    return rasters(corners, start, right, down, resolution.density or 1.0, asked)
+    return rasters(corners, start, right, down, density, asked, a_pixel_at_least=resolution is None)
+
+
+def _texture_density(corners: FloatArray, mesh: PolygonMesh, spec: DisplayFile) -> FloatArray:
+    """Pixels a metre (F,) at which a facet has as many pixels as its place in the texture.
+
+    The layout takes its rasters from the texture coordinates themselves; these are what `quilt info` tells
+    of the display.
+    """
+    assert (
+        spec.layout is not None
+    )  # a file with a mesh has a resolution, or takes the layout from its texture
+    if mesh.uv is None:
+        message = "the mesh has no texture coordinates (expected them, or resolution beside another layout)"
+        raise DisplayError(spec.source.problem(("layout",), message))
+    start = mesh.corner_start
+    flat = np.zeros((len(corners), 3))
+    flat[:, :2] = mesh.uv * spec.layout.size
+    placed = np.where(np.isfinite(flat), flat, 0.0)
+    area, textured = (area_vectors(points, start) for points in (corners, placed))
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # of places far beyond any page, which the layout tells
+        density = np.sqrt(np.sqrt(dot(textured, textured) / dot(area, area)))
+    result: FloatArray = np.where(np.isfinite(density), density, 0.0)
+    return result
 
 
 def _unknown_facets(count: int, spec: DisplayFile) -> Iterator[Problem]:
@@ -169,9 +206,12 @@ def _impossible_sizes(
         mistaken = (size[facet] > MOST_PIXELS).any() and spec.units == "m" and extent > 10
         hint = f"; is the mesh in another unit? units: {likely_unit(extent)}" if mistaken else ""
         own = spec.facets.get(int(facet) + 1)
-        key = next(name for name in ResolutionSpec.model_fields if getattr(spec.resolution, name))
+        named = (name for name in ResolutionSpec.model_fields if getattr(spec.resolution, name, None))
+        key = ("resolution", next(named)) if spec.resolution is not None else ("layout", "size")
+        if spec.resolution is not None and spec.layout is not None:
+            hint += "; leave resolution out, since the texture coordinates tell"
         yield spec.source.problem(
-            ("facets", int(facet) + 1, "facet_pixels") if own and own.facet_pixels else ("resolution", key),
+            ("facets", int(facet) + 1, "facet_pixels") if own and own.facet_pixels else key,
             f"makes {called(int(facet), names)} {width} × {height} pixels "
             f"(expected 1 to {MOST_PIXELS} a side{hint})",
         )

@@ -9,8 +9,9 @@ from fractions import Fraction
 
 import numpy as np
 
+from quiltcli.charts.chart import EDGE_ON, Chart
 from quiltcli.display.edges import SharedEdges, find_shared_edges
-from quiltcli.errors import Problem
+from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import polygons
 from quiltcli.formats.yaml.source import Source
 from quiltcli.geometry import (
@@ -23,7 +24,9 @@ from quiltcli.geometry import (
     offsets,
     segments,
 )
-from quiltcli.job.display import PlaceOnPage
+from quiltcli.job.places import PlaceOnPage
+
+_PLACES = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +43,7 @@ class Places:
         mirror: (n,) whether the image is mirrored.
         corner: (n, 2) pixel x, y of the page.
         source: finds lines in the display file.
-        panels: whether the file lists panels, whose places stand with them.
+        keys: where in the file each facet's own entry stands.
     """
 
     facet: Int32Array
@@ -49,19 +52,22 @@ class Places:
     mirror: BoolArray
     corner: Int32Array
     source: Source
-    panels: bool = False
+    keys: Mapping[int, tuple[str | int, ...]]
 
     def problem(self, key: Sequence[str | int], message: str) -> Problem:
         """A problem with the place of a facet: the key begins with `facets` and its id."""
         facet = int(key[1])
-        where = ("panels", facet - 1) if self.panels else ("facets", facet)
-        return self.source.problem((*where, "place"), message)
+        return self.source.problem((*self.keys[facet], "place"), message)
 
 
-def places_of(
-    given: Mapping[int, PlaceOnPage | None], source: Source, *, panels: bool = False
-) -> Places | None:
-    """The places in the quilt that a display file gives, by facet id in ascending order; None without any."""
+def places_of(given: Mapping[int, PlaceOnPage | None], source: Source, *, listed: str = "") -> Places | None:
+    """The places in the quilt that a display file gives, by facet id in ascending order; None without any.
+
+    Args:
+        given: the places.
+        source: finds lines in the display file.
+        listed: key of the list in which the facets' entries stand one by one; they stand by id without.
+    """
     known = {facet: place for facet, place in given.items() if place is not None}
     if not known:
         return None
@@ -72,7 +78,7 @@ def places_of(
         mirror=np.array([place.mirror for place in known.values()], dtype=np.bool_),
         corner=np.array([place.at for place in known.values()], dtype=np.int32),
         source=source,
-        panels=panels,
+        keys={facet: (listed, facet - 1) if listed else ("facets", facet) for facet in known},
     )
 
 
@@ -98,6 +104,8 @@ class Facets:
         uv: (C, 2) texture coordinates of the mesh, v up, or None.
         path: the display file as the user named it, for messages.
         places: facets whose place in the quilt the display file gives; None when it gives none.
+        charts: of F facets those of curved ones, None for flat ones; empty where all are flat. A curved
+            facet's corners, origin and steps are those of a rectangle that stands for it.
     """
 
     names: tuple[str, ...]
@@ -114,6 +122,13 @@ class Facets:
     uv: FloatArray | None
     path: str
     places: Places | None = None
+    charts: tuple[Chart | None, ...] = ()
+
+    @property
+    def curved(self) -> BoolArray:
+        """Which facets (F,) have a chart."""
+        found = [chart is not None for chart in self.charts] or [False] * self.count
+        return np.array(found, dtype=np.bool_)
 
     @property
     def count(self) -> int:
@@ -137,7 +152,37 @@ class Facets:
         for exact in (self.corners, self.origin, self.du, self.dv, self.normal):
             # Adding zero turns −0 into 0.
             digest.update(np.ascontiguousarray(np.round(exact, 9) + 0.0, dtype="<f8").tobytes())
+        for chart in self.charts:
+            digest.update(b"-" if chart is None else chart.record.encode())
         return digest.hexdigest()
+
+
+def demand_flat(facets: Facets, what: str) -> None:
+    """Raise a DisplayError where a display has curved facets, for something that is for flat ones."""
+    if facets.curved.any():
+        words = f"{what} is for flat facets, and this display has curved ones"
+        raise DisplayError(Problem(f"{words} (quilt facet cuts a surface into flat ones)", facets.path))
+
+
+def display_points(facets: Facets) -> FloatArray:
+    """Points (N, 3) all over a display: corners of flat facets, places on curved ones, world metres.
+
+    Projections, which stand nowhere, count by the rectangles that stand for them.
+    """
+    if not facets.charts:
+        return facets.corners
+    row, _ = segments(facets.corner_start)
+    standing = np.array([chart is not None and chart.stands for chart in facets.charts])
+    found = [facets.corners[~standing[row]]]
+    found += [chart_points(chart).T for chart in facets.charts if chart is not None and chart.stands]
+    return np.concatenate(found)
+
+
+def chart_points(chart: Chart) -> FloatArray:
+    """Points (3, N), or directions, at places all over a chart that there are."""
+    x, y = (np.clip(np.linspace(0, side, _PLACES), 0.5, side - 0.5) for side in chart.size)
+    points = np.broadcast_to(chart.points(x, y[:, None]), (3, _PLACES, _PLACES)).reshape(3, -1)
+    return points[:, np.isfinite(points.sum(axis=0))]
 
 
 def scaled(facets: Facets, scale: Fraction) -> Facets:
@@ -147,19 +192,30 @@ def scaled(facets: Facets, scale: Fraction) -> Facets:
     """
     top, bottom = scale.numerator, scale.denominator
     size = -(-facets.size.astype(np.int64) * top // bottom)
+    size = np.maximum(size, 1)
     du, dv = facets.du * (bottom / top), facets.dv * (bottom / top)
-    return replace(facets, size=np.maximum(size, 1).astype(np.int32), du=du, dv=dv, places=None)
+    if facets.charts:
+        # A surface has all of its raster: its pixels grow, and what stands for it as they do.
+        ratio = np.where(facets.curved[:, None], facets.size / size, bottom / top)
+        du, dv = facets.du * ratio[:, :1], facets.dv * ratio[:, 1:]
+    pairs = zip(facets.charts, size.tolist(), strict=False)
+    charts = tuple(None if chart is None else chart.scaled((wide, high)) for chart, (wide, high) in pairs)
+    return replace(facets, size=size.astype(np.int32), du=du, dv=dv, places=None, charts=charts)
 
 
 def lit_facets(facets: Facets, eye: FloatArray) -> BoolArray:
     """Which facets (F,) show an image to an eye (3,): enabled, and lit on the side it is on.
 
-    An eye in a facet's plane, to a billionth of a metre, sees nothing of it.
+    An eye in a facet's plane, to a billionth of a metre, sees nothing of it. A curved facet may be lit in
+    parts, which its pixels tell.
     """
     height = dot(eye - facets.origin, facets.normal)
     if facets.both_sides:
         height = np.abs(height)
-    result: BoolArray = facets.enabled & (height > 1e-9)
+    seen = height > EDGE_ON
+    if facets.charts:
+        seen |= facets.curved
+    result: BoolArray = facets.enabled & seen
     return result
 
 

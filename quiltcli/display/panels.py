@@ -54,7 +54,7 @@ def panel_facets(spec: DisplayFile) -> Facets:
         mirrored=mirrored,
         uv=None,
         path=str(spec.source.path),
-        places=places_of({k: panel.place for k, panel in enumerate(panels, 1)}, spec.source, panels=True),
+        places=places_of({k: panel.place for k, panel in enumerate(panels, 1)}, spec.source, listed="panels"),
     )
 
 

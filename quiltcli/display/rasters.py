@@ -136,8 +136,10 @@ def rasters(
     start: IntArray,
     right: FloatArray,
     down: FloatArray,
-    pixels_per_metre: float,
+    pixels_per_metre: FloatArray,
     facet_pixels: Int32Array,
+    *,
+    a_pixel_at_least: bool = False,
 ) -> Rasters:
     """Rasters that bound the polygons, starting at their top-left.
 
@@ -149,8 +151,9 @@ def rasters(
         start: (F+1,) offsets.
         right: (F, 3) unit directions.
         down: (F, 3) unit directions.
-        pixels_per_metre: density where `facet_pixels` is 0.
+        pixels_per_metre: (F,) density where `facet_pixels` is 0.
         facet_pixels: (F, 2) width and height, or 0.
+        a_pixel_at_least: whether the density is raised where a facet would be narrower than a pixel.
 
     Returns:
         Rasters; a size is clipped to 0 .. MOST_PIXELS + 1, 0 meaning less than one pixel.
@@ -165,11 +168,13 @@ def rasters(
         extent.append(np.maximum.reduceat(along, start[:-1]) - low[-1])
     spans = np.stack(extent, axis=1)
     given: BoolArray = facet_pixels > 0
-    exact = spans * pixels_per_metre
+    if a_pixel_at_least:
+        pixels_per_metre = np.maximum(pixels_per_metre, 1 / spans.min(axis=1))
+    exact = spans * pixels_per_metre[:, None]
     # A hair over a whole number is rounding, not another pixel.
     counted = np.where(exact < 1 - _TIE, 0, np.clip(np.ceil(exact - _ROUNDED), 1, MOST_PIXELS + 1))
     size = np.where(given, facet_pixels, counted)
-    pitch = np.where(given, spans / np.maximum(size, 1), 1 / pixels_per_metre)
+    pitch = np.where(given, spans / np.maximum(size, 1), 1 / pixels_per_metre[:, None])
     return Rasters(
         origin=anchor + low[0][:, None] * right + low[1][:, None] * down,
         du=pitch[:, :1] * right + 0.0,  # no −0, for people who read layouts

@@ -22,8 +22,12 @@ def pfm_bytes(image: Float32Array) -> bytes:
     return header + np.ascontiguousarray(image[::-1], dtype="<f4").tobytes()
 
 
-def read_pfm(data: bytes) -> Float32Array:
-    """The picture (H, W, 3 or 1) in a PFM, row 0 being the top; values that are not finite become 0.
+def read_pfm(data: bytes, *, finite: bool = True) -> Float32Array:
+    """The picture (H, W, 3 or 1) in a PFM, row 0 being the top.
+
+    Args:
+        data: the file's bytes.
+        finite: whether values that are not finite become 0.
 
     Raises:
         PfmError: the header is none, or the data is not as long as it says.
@@ -45,5 +49,6 @@ def read_pfm(data: bytes) -> Float32Array:
     # A negative scale says little-endian.
     pixels = np.frombuffer(data, "<f4" if scale < 0 else ">f4", offset=match.end())
     image = pixels.reshape(height, width, channels)[::-1].astype(np.float32)
-    image[~np.isfinite(image)] = 0  # common in the third channel, which means nothing in two dimensions
+    if finite:
+        image[~np.isfinite(image)] = 0  # common in the third channel, which means nothing in two dimensions
     return image

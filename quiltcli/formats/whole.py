@@ -62,11 +62,17 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write `text` as UTF-8 with bare newlines, whole or not at all (OutputError)."""
-    write_binary(path, text.encode())
+    write_whole(path, text.encode())
 
 
-def write_binary(path: Path, data: bytes) -> None:
-    """Write bytes, whole or not at all (OutputError)."""
+def write_whole(path: Path, data: bytes) -> None:
+    """Write `data`, whole or not at all (OutputError)."""
+    with whole_file(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file of bytes, whole or not at all (OutputError if that fails)."""
     with whole_file(path) as temporary:
         temporary.write_bytes(data)
 

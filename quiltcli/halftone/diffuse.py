@@ -42,7 +42,7 @@ def diffuse(tones: NDArray[np.floating], inside: BoolArray, shares: Float32Array
     for y in range(top, bottom):
         assert here is not None
         under = _columns(inside[:, y + 1, left:right]) if y + 1 < height else np.zeros_like(here)
-        way = slice(None, None, 1 - 2 * ((y - top) % 2))
+        way = slice(None, None, 1 - 2 * (y % 2))
         value, (near, behind, down) = _row(tones[:, y, left:right], here, shares)
         value += below
         lit = np.empty(value.shape, dtype=np.bool_)

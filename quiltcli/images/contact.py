@@ -16,6 +16,7 @@ from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.drawing.font import HEIGHT, text_mask, text_width
 from quiltcli.images.names import names_in
 from quiltcli.images.preview import Bytes, Look, display_values, image_colors, scaled_down, write_values
+from quiltcli.images.turns import is_ring_output, turn_pictures
 from quiltcli.job.frames import format_frames
 
 MOST = 2000
@@ -53,11 +54,13 @@ def contact_sheet(out: Path, picture: Path, sheet: Sheet | None = None) -> tuple
         OutputError: there are no such images, or too many, or they cannot be read or the sheet written.
     """
     sheet = sheet or Sheet()
-    images = chosen_images(out, sheet)
-    cells = [_thumbnail(path, sheet) for _, path in images]
-    pixels = _laid_out(cells, [label for label, _ in images], sheet)
+    if is_ring_output(out):
+        shown = list(turn_pictures(out, sheet.width, sheet.frames))
+    else:
+        shown = [(label, _thumbnail(path, sheet)) for label, path in chosen_images(out, sheet)]
+    pixels = _laid_out([cell for _, cell in shown], [label for label, _ in shown], sheet)
     write_values(picture, pixels, sheet.look.view)
-    return len(images), (pixels.shape[1], pixels.shape[0])
+    return len(shown), (pixels.shape[1], pixels.shape[0])
 
 
 def chosen_images(out: Path, sheet: Sheet) -> list[tuple[str, Path]]:

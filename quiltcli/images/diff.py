@@ -28,6 +28,7 @@ MATCH, WARN, FAIL, SIZE, FILE = 0, 1, 2, 3, 4
 VERDICTS = ("match", "warn", "fail", "size", "file error")
 
 _BLOCK = 256  # rows compared at a time: bounded memory, and the sums of a file do not depend on the machine
+_PACKED = "dvi.????????.png"
 _FIELD = re.compile(r"#+|%0?\d*d")
 
 
@@ -61,6 +62,7 @@ class ChannelDiff:
         over: pixels that differ by more than `Limits.fail`, or in finiteness.
         nonfinite: pixels where one value is not finite and the other is not the same.
         first: (x, y) of the first pixel over, None when there is none.
+        code: the verdict on this channel alone, 0 to 2 as in `VERDICTS`.
     """
 
     part: int
@@ -71,6 +73,7 @@ class ChannelDiff:
     over: int
     nonfinite: int
     first: tuple[int, int] | None
+    code: int
 
 
 @dataclass(frozen=True)
@@ -105,8 +108,8 @@ class DiffResult:
 def diff(a: str | Path, b: str | Path, limits: Limits | None = None) -> DiffResult:
     """Compare two images, two sequences (`page_01.####.exr`, `page_01.%04d.exr`) or two folders.
 
-    Of folders all EXR files below them are compared, by their relative names. Whatever cannot be
-    compared is a verdict (code 4), not an error.
+    Of folders all EXR files and packed pictures of a 360° light field display below them are compared,
+    by their relative names. Whatever cannot be compared is a verdict (code 4), not an error.
     """
     for given in (a, b):
         if fault := name_fault(given):
@@ -131,7 +134,8 @@ def _named_files(given: str | Path) -> Mapping[str, Path] | None:
     """Files of a folder by relative name, of a sequence by frame; None of a single image."""
     path = Path(given)
     if path.is_dir():
-        files = (file for file in path.rglob("*.exr") if not file.name.startswith("."))
+        every = (file for kind in ("*.exr", _PACKED) for file in path.rglob(kind))
+        files = (file for file in every if not file.name.startswith("."))
         return {file.relative_to(path).as_posix(): file for file in files}
     field = _FIELD.search(path.name)
     if not field:
@@ -199,13 +203,17 @@ def diff_channels(
     height, width = next(iter(a.values())).shape
     failing, warning = np.zeros((height, width), bool), np.zeros((height, width), bool)
     rows = [_diff_channel(name, a[name], b[name], limits, part, failing, warning) for name in sorted(a)]
-    pixels, worst = height * width, max(row.maximum for row in rows)
-    hard = worst > limits.hard_fail or (limits.hard_fail < math.inf and any(row.nonfinite for row in rows))
-    if hard or np.count_nonzero(failing) > limits.fail_percent / 100 * pixels:
-        return FAIL, rows
-    if np.count_nonzero(warning) > limits.warn_percent / 100 * pixels:
-        return WARN, rows
-    return MATCH, rows
+    worst, nonfinite = max(row.maximum for row in rows), sum(row.nonfinite for row in rows)
+    over, warned = int(np.count_nonzero(failing)), int(np.count_nonzero(warning))
+    return _verdict(limits, height * width, worst, nonfinite, over, warned), rows
+
+
+def _verdict(limits: Limits, pixels: int, worst: float, nonfinite: int, over: int, warned: int) -> int:
+    """The verdict on so many pixels, of which some are `over` the limit of failing, or of warning."""
+    hard = worst > limits.hard_fail or (limits.hard_fail < math.inf and nonfinite > 0)
+    if hard or over > limits.fail_percent / 100 * pixels:
+        return FAIL
+    return WARN if warned > limits.warn_percent / 100 * pixels else MATCH
 
 
 def _diff_channel(
@@ -219,12 +227,14 @@ def _diff_channel(
 ) -> ChannelDiff:
     """The row of one channel; marks its pixels in `failing` and `warning`, which gather all channels'."""
     maximum = total = squares = 0.0
-    over = nonfinite = finite = 0
+    over = warned = nonfinite = finite = 0
     first = None
     for y, apart, unlike in _blocks(a, b):
         fails = (apart > limits.fail) | unlike
         failing[y : y + len(apart)] |= fails
-        warning[y : y + len(apart)] |= (apart > limits.warn) | unlike
+        warns = (apart > limits.warn) | unlike
+        warning[y : y + len(apart)] |= warns
+        warned += int(np.count_nonzero(warns))
         if first is None and fails.any():
             row, column = divmod(int(np.argmax(fails)), fails.shape[1])
             first = (column, y + row)
@@ -234,7 +244,9 @@ def _diff_channel(
         maximum, total = max(maximum, float(apart.max())), total + float(apart.sum())
         squares += float(np.square(apart).sum())
     count = max(finite, 1)
-    return ChannelDiff(part, name, maximum, total / count, math.sqrt(squares / count), over, nonfinite, first)
+    code = _verdict(limits, a.size, maximum, nonfinite, over, warned)
+    rms = math.sqrt(squares / count)
+    return ChannelDiff(part, name, maximum, total / count, rms, over, nonfinite, first, code)
 
 
 def _blocks(a: NDArray[Any], b: NDArray[Any]) -> Iterator[tuple[int, NDArray[np.float64], BoolArray]]:
@@ -298,14 +310,15 @@ def diff_rows(result: DiffResult) -> list[tuple[str, ...]]:
     """The table a reader sees, in `COLUMNS`: a line for each channel, or one that says what went wrong."""
     rows: list[tuple[str, ...]] = []
     for file in result.files:
-        verdict = VERDICTS[file.code]
         if not file.channels:
-            rows.append((file.name, "", "", verdict, file.message, "", "", "", "", ""))
+            rows.append((file.name, "", "", VERDICTS[file.code], file.message, "", "", "", "", ""))
         for row in file.channels:
             figures = (f"{number:.6g}" for number in (row.maximum, row.mean, row.rms))
             first = f"{row.first[0]}, {row.first[1]}" if row.first else ""
             counts = (str(row.over), str(row.nonfinite), first)
-            same = not (row.maximum or row.nonfinite)  # another channel's difference is not this one's
-            own = VERDICTS[MATCH] if same else verdict
-            rows.append((file.name, str(row.part), row.channel, own, *figures, *counts))
+            verdict = VERDICTS[row.code]
+            rows.append((file.name, str(row.part), row.channel, verdict, *figures, *counts))
+        if file.channels and file.code > max(row.code for row in file.channels):
+            # Shares of pixels are those of all channels together.
+            rows.append((file.name, "", "together", VERDICTS[file.code], "", "", "", "", "", ""))
     return rows

@@ -33,14 +33,15 @@ def viewer_attributes(view: View, facet: int, fps: Fraction, job_sha: str, versi
 
 def _told(viewer: Viewer) -> dict[str, object]:
     """A viewer for programs, in numbers that read back exactly."""
+    facets = None if viewer.facets is None else list(viewer.facets)
+    return {"name": viewer.name, "facets": facets, **_pose(viewer)}
+
+
+def _pose(viewer: Viewer) -> dict[str, object]:
+    """Where a viewer is and what near and far are, in numbers that read back exactly."""
     places = {"eye": viewer.eye, "look": viewer.look, "up": viewer.up, "head": viewer.head}
-    return {
-        "name": viewer.name,
-        "facets": None if viewer.facets is None else list(viewer.facets),
-        **{name: place.tolist() for name, place in places.items() if place is not None},
-        "near": viewer.near,
-        "far": viewer.far,
-    }
+    known = {name: place.tolist() for name, place in places.items() if place is not None}
+    return {**known, "near": viewer.near, "far": viewer.far}
 
 
 def _attributes(view: View, viewer: Viewer, fps: Fraction, job_sha: str, version: str) -> dict[str, object]:
@@ -53,6 +54,7 @@ def _attributes(view: View, viewer: Viewer, fps: Fraction, job_sha: str, version
         "quilt:near": float(viewer.near),
         "quilt:far": float(viewer.far),
         "quilt:depth": viewer.depth,
+        "quilt:pose": json.dumps(_pose(viewer)),
         "quilt:job": job_sha,
         "quilt:version": version,
     }
@@ -68,6 +70,11 @@ def facet_attributes(facet_id: int, facet_from_world: FloatArray) -> dict[str, o
     """What a facet image adds: its 1-based id and its (3, 4) map, written so that it reads back exactly."""
     numbers = " ".join(repr(float(number)) for number in np.asarray(facet_from_world).reshape(12))
     return {"quilt:facet": int(facet_id), "quilt:facet_from_world": numbers}
+
+
+def surface_attributes(facet_id: int, record: str) -> dict[str, object]:
+    """What the image of a curved facet adds: its 1-based id and its surface or projection, as JSON."""
+    return {"quilt:facet": int(facet_id), "quilt:surface": record}
 
 
 def is_complete(path: Path, job_sha: str, frame: int) -> bool:

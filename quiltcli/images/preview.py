@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem, raise_all
-from quiltcli.formats.exr.image import read_first
+from quiltcli.formats.exr.image import read_parts
 from quiltcli.formats.png import save_png
 from quiltcli.formats.stills import write_still
 from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import Float32Array
+from quiltcli.images.layers import joined
 from quiltcli.images.window import whole_frame
 
 Bytes: TypeAlias = NDArray[np.uint8]
@@ -235,7 +236,7 @@ def image_colors(image: Path) -> NDArray[Any]:
     Raises:
         OutputError: the image cannot be read or has no colours.
     """
-    found = read_first(image)
+    found = joined(read_parts(image))[0]
     if missing := [name for name in "RGB" if name not in found.channels]:
         have = ", ".join(found.channels)
         wrong = f"has no channel {missing[0]}, expected R, G and B (it has {have})"

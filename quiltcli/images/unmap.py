@@ -11,10 +11,11 @@ import numpy as np
 
 from quiltcli.channels import BACKGROUND
 from quiltcli.errors import OutputError, Problem, raise_all
-from quiltcli.formats.exr.image import Image, read_exr, read_header, write_exr
+from quiltcli.formats.exr.image import Image, read_header, write_exr
 from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import facet_from_world
 from quiltcli.images.facets import cut_facet, page_of
+from quiltcli.images.layers import read_view
 from quiltcli.images.metadata import facet_attributes
 from quiltcli.images.names import facet_path, name_of
 from quiltcli.images.window import frame_size, whole_frame
@@ -65,7 +66,7 @@ def unmap(
     maps = facet_from_world(layout.origin, layout.du, layout.dv)
     written = []
     for file in files:
-        image = read_exr(file.path)
+        image = read_view(file.path)
         pixels = whole_frame(image, background)
         make_folder(facet_path(out, 1, 1).parent)  # only now: a damaged quilt leaves no empty folder
         page_owners = page_of(owners, layout, file.page)

@@ -4,6 +4,7 @@ Load a file and every problem in it comes in one `JobError`; every model and par
 `source`, whose `problem(key, message)` points into the file when a later stage finds something.
 """
 
+from quiltcli.job.calibration import CalibrationFile
 from quiltcli.job.check import check_file
 from quiltcli.job.digest import file_sha256, job_sha256
 from quiltcli.job.display import DisplayFile, FacetSpec, PanelSpec, ResolutionSpec, TransformSpec
@@ -20,24 +21,20 @@ from quiltcli.job.layout import (
     read_aspect,
 )
 from quiltcli.job.lengths import UNITS
+from quiltcli.job.lightfield import LightfieldFile
+from quiltcli.job.lights import AmbientLight, AreaLight, DirectionalLight, LightSpec, PointLight, SpotLight
 from quiltcli.job.load import (
     file_kind,
+    load_calibration_file,
     load_display_file,
     load_job,
     load_layout_file,
+    load_lightfield_file,
     load_scene_file,
     pack_spec,
 )
 from quiltcli.job.recorded import FilterSpec, GapsSpec, MarkerSpec, RecordedSpec
-from quiltcli.job.scene import (
-    AmbientLight,
-    DirectionalLight,
-    LightSpec,
-    MaterialSpec,
-    ObjectSpec,
-    PointLight,
-    SceneFile,
-)
+from quiltcli.job.scene import MaterialSpec, ObjectSpec, SceneFile
 from quiltcli.job.viewer import CsvSpec, KeyframeSpec, OrbitSpec, PathSpec, ViewerSpec
 
 __all__ = [
@@ -46,6 +43,8 @@ __all__ = [
     "PACKING_METHODS",
     "UNITS",
     "AmbientLight",
+    "AreaLight",
+    "CalibrationFile",
     "CsvSpec",
     "DirectionalLight",
     "DisplayFile",
@@ -56,6 +55,7 @@ __all__ = [
     "KeyframeSpec",
     "LayoutFile",
     "LightSpec",
+    "LightfieldFile",
     "MarkerSpec",
     "MaterialSpec",
     "ObjectSpec",
@@ -71,6 +71,7 @@ __all__ = [
     "RenderSpec",
     "ResolutionSpec",
     "SceneFile",
+    "SpotLight",
     "TransformSpec",
     "UvLayoutSpec",
     "ViewerSpec",
@@ -80,9 +81,11 @@ __all__ = [
     "file_kind",
     "file_sha256",
     "job_sha256",
+    "load_calibration_file",
     "load_display_file",
     "load_job",
     "load_layout_file",
+    "load_lightfield_file",
     "load_scene_file",
     "pack_spec",
     "read_aspect",

@@ -11,8 +11,10 @@ from quiltcli.job.layout import LayoutFile
 from quiltcli.job.layout_table import read_layout_table
 from quiltcli.job.load import (
     file_kind,
-    load_display_file,
+    load_any_display,
+    load_calibration_file,
     load_job,
+    load_lightfield_file,
     load_scene_file,
     tried,
 )
@@ -33,7 +35,9 @@ def check_file(path: Path | str) -> list[Problem]:
 
 
 _LOAD: dict[str, Callable[[Path], object]] = {
-    "quilt_display": load_display_file,
+    "quilt_display": load_any_display,
     LayoutFile.kind: read_layout_table,
     "quilt_scene": load_scene_file,
+    "quilt_lightfield": load_lightfield_file,
+    "quilt_calibration": load_calibration_file,
 }

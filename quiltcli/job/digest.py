@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from quiltcli.job.dump import plain
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import PackSpec
 from quiltcli.job.layout_table import places_sha256, read_layout_table
-from quiltcli.job.load import load_display_file, load_scene_file
+from quiltcli.job.load import load_any_display, load_lightfield_file, load_scene_file
 from quiltcli.job.model import YAMLS
 
 _HEAD = 1 << 16  # bytes of a PLY file that hold its header
@@ -35,8 +35,8 @@ def job_sha256(job: JobFile) -> str:
     read, whatever they are by now.
     """
     data = plain(job, file_sha256)
-    data["display"] = plain(load_display_file(job.display), file_sha256)
-    data["scene"] = _scene(job.scene)
+    data["display"] = plain(load_any_display(job.display), file_sha256)
+    data["scene"] = _scene(job.scene) if job.lightfield is None else _lightfield(job.scene, job.frames)
     if isinstance(job.layout, Path):
         data["layout"] = _layout_sha256(job.layout)
     elif isinstance(job.layout, PackSpec):
@@ -77,6 +77,14 @@ def _scene(path: Path) -> dict[str, Any]:
     for item, entry in zip(scene.objects, data["objects"], strict=True):
         if item.sequence is not None:
             entry["mesh"] = [file_sha256(file) for _, file in item.sequence.files()]
+    return data
+
+
+def _lightfield(path: Path, frames: Sequence[int]) -> dict[str, Any]:
+    """A light field with the hashes of its pictures."""
+    file = load_lightfield_file(path)
+    data: dict[str, Any] = plain(file, file_sha256)
+    data["pictures"] = [file_sha256(picture) for picture in file.pictures(frames)]
     return data
 
 

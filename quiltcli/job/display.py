@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, WithJsonSchema
+from pydantic import BeforeValidator, Field, PlainValidator, WithJsonSchema
 
 from quiltcli import geometry
 from quiltcli.job.layout import UvLayoutSpec
@@ -22,7 +22,6 @@ from quiltcli.job.model import (
     Listed,
     MeshPath,
     Model,
-    Natural,
     Number,
     OneOf,
     Positive,
@@ -33,6 +32,9 @@ from quiltcli.job.model import (
     exactly_one,
     one_of,
 )
+from quiltcli.job.places import PlaceOnPage, Quarter
+from quiltcli.job.projections import ProjectionSpec
+from quiltcli.job.surfaces import SurfaceSpec
 
 
 def _units(value: Any) -> Any:
@@ -45,12 +47,6 @@ def _units(value: Any) -> Any:
     if not 1 / FARTHEST <= value <= FARTHEST:
         raise complaint(f"must be from 1e-09 to 1e+09 metres, got {describe(value)}")
     return float(value)
-
-
-def _quarter(value: float) -> int:
-    if value % 90:
-        raise complaint(f"expected 0, 90, 180 or 270, got {value:g}")
-    return int(value) % 360
 
 
 def _scale(value: Any) -> Any:
@@ -147,19 +143,6 @@ class ResolutionSpec(Model):
         return None if length is None else float(1 / length)
 
 
-class PlaceOnPage(Model):
-    """Where a facet's image is to stay in the quilt, whatever the packing does with the others."""
-
-    page: Count = 1
-    """Page, the first being 1."""
-    at: Annotated[tuple[Natural, Natural], Items(2)]
-    """Where on the page the image's top-left pixel lies, x and y, after mirroring and turning, pixels."""
-    rotate: Annotated[Number, AfterValidator(_quarter), WithJsonSchema({"enum": [0, 90, 180, 270]})] = 0
-    """Quarter turn of the image in the quilt, clockwise, degrees."""
-    mirror: bool = False
-    """Mirror the image left to right in the quilt, before it is turned."""
-
-
 class FacetSpec(Model):
     """What is different on one facet."""
 
@@ -169,7 +152,7 @@ class FacetSpec(Model):
     """Width and height of this facet, pixels."""
     up: Direction | None = None
     """World direction that is up in the facet's image."""
-    rotate: Annotated[Number, AfterValidator(_quarter), WithJsonSchema({"enum": [0, 90, 180, 270]})] = 0
+    rotate: Quarter = 0
     """Quarter turn of the raster, clockwise as seen from the lit side, degrees."""
     mirror: bool = False
     """Mirror the image, for rear projection."""
@@ -219,7 +202,7 @@ class PanelSpec(Model):
 
 
 class DisplayFile(FileModel):
-    """A display of planar facets: the faces of a mesh, or panels."""
+    """A display: the faces of a mesh, panels, curved surfaces, or a projection about the eye."""
 
     kind: ClassVar[str] = "quilt_display"
 
@@ -229,6 +212,10 @@ class DisplayFile(FileModel):
     """Polygon mesh; every face is one facet, in the order of the file."""
     panels: Annotated[tuple[PanelSpec, ...], Listed, Field(min_length=1)] | None = None
     """Flat rectangles instead of a mesh; every panel is one facet, in this order."""
+    surfaces: Annotated[tuple[SurfaceSpec, ...], Listed, Field(min_length=1)] | None = None
+    """Curved surfaces, instead of a mesh or panels or beside them; each is one facet, after the others."""
+    projection: ProjectionSpec | None = None
+    """A picture around the eye that goes along with it, instead of anything that stands in the world."""
     units: Units = "m"
     """What the mesh or the panels are measured in: m, cm, mm, in, ft, or a number of metres."""
     up_axis: UpAxis = "y"
@@ -236,7 +223,8 @@ class DisplayFile(FileModel):
     viewing_side: Annotated[str, OneOf(("front", "back", "both"))] = "front"
     """Lit side: front, where the winding faces; back, seen from inside; both."""
     resolution: ResolutionSpec | None = None
-    """How many pixels the facets of a mesh have; panels have pixels of their own."""
+    """How many pixels the facets of a mesh have; panels have pixels of their own, and where `layout` is given
+    the texture coordinates tell."""
     facets: dict[Count, FacetSpec] = Field(default_factory=dict)
     """What is different on single facets, by facet id."""
     transform: TransformSpec | None = None
@@ -259,14 +247,22 @@ class DisplayFile(FileModel):
 
     def cross_checks(self) -> Iterator[Complaint]:
         """A mesh or panels, each with keys of its own; a mirrored display would be lit on the wrong side."""
-        if self.mesh is None and self.panels is None:
-            yield ("mesh",), "missing key (polygon mesh; or panels: flat rectangles)"
+        if self.projection is not None:
+            yield from self._beside_projection()
+            return
+        if self.mesh is None and self.panels is None and self.surfaces is None:
+            words = "missing key (polygon mesh; or panels: flat rectangles; or surfaces; or a projection)"
+            yield ("mesh",), words
         elif self.mesh is not None and self.panels is not None:
             yield ("panels",), "cannot stand beside mesh (expected only one of mesh or panels)"
-        if self.panels is None and self.resolution is None:
-            yield ("resolution",), "missing key (how many pixels the facets have)"
+        placed = self.mesh is None and self.surfaces
+        if self.panels is None and self.resolution is None and self.layout is None and not placed:
+            words = "missing key (how many pixels the facets have; or layout: {from_uv: true, size: [W, H]}"
+            yield ("resolution",), f"{words} for a mesh whose texture coordinates tell)"
         if self.panels is not None:
             yield from self._beside_panels()
+        elif self.mesh is None and self.surfaces is not None:
+            yield from self._surfaces_alone()
         if self.transform is not None and np.linalg.det(self.transform.array[:3, :3]) < 0:
             yield ("transform",), "mirrors the display (its determinant is negative)"
 
@@ -282,4 +278,28 @@ class DisplayFile(FileModel):
             yield (
                 ("viewing_side",),
                 "expected front or both beside panels (turn one by yaw_deg: 180), got back",
+            )
+
+    def _beside_projection(self) -> Iterator[Complaint]:
+        """A projection is all of its display, and stands nowhere in the world."""
+        for name in ("mesh", "panels", "surfaces", "resolution", "transform", "layout"):
+            if getattr(self, name) is not None:
+                yield (name,), "cannot stand beside projection (a projection is the whole display)"
+        if self.facets:
+            yield ("facets",), "cannot stand beside projection (a projection is the whole display)"
+        if self.viewing_side != "front":
+            yield ("viewing_side",), f"cannot stand beside projection, got {self.viewing_side}"
+
+    def _surfaces_alone(self) -> Iterator[Complaint]:
+        """What only a mesh or panels can have."""
+        if self.resolution is not None:
+            yield ("resolution",), "belongs to a mesh (each of the surfaces has pixels of its own)"
+        if self.facets:
+            yield ("facets",), "belongs to a mesh (name, place and mirror are keys of each surface)"
+        if self.layout is not None:
+            yield ("layout",), "takes texture coordinates of a mesh (give the surfaces a place instead)"
+        if self.viewing_side != "front":
+            yield (
+                ("viewing_side",),
+                f"belongs to a mesh (each surface says where it is lit), got {self.viewing_side}",
             )

@@ -58,7 +58,8 @@ def dump_yaml(data: Any) -> str:
 def plain(value: Any, path_text: Callable[[Path], Any]) -> Any:
     """Plain data of a model: keys that hold nothing left out, file names through `path_text`."""
     if isinstance(value, Model):
-        items = ((name, getattr(value, name)) for name in type(value).model_fields)
+        fields = type(value).model_fields
+        items = ((field.alias or name, getattr(value, name)) for name, field in fields.items())
         return {name: plain(item, path_text) for name, item in items if item is not None}
     if isinstance(value, dict):
         return {key: plain(value[key], path_text) for key in sorted(value)}

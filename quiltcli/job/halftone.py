@@ -20,7 +20,7 @@ class HalftoneSpec(Model):
     exposure: Positive = 1.0
     """Factor on all tones, before they are cut at 1; linear."""
     angle: Annotated[float, Field(allow_inf_nan=False, ge=0, lt=0.5)] = 0.0
-    """Share of a picture's error that the next one gets, turned with the mirror, linear. An eye sees it
-    coarser as a rule, and the first pictures of a turn darker: 0 is best."""
+    """Share of a picture's error that the next one gets, turned with the mirror, linear. Dark tones get
+    coarser by it, and the first pictures of a turn are off: 0 is best as a rule."""
     compensate: Annotated[str, OneOf(COMPENSATIONS)] = "none"
     """Whether pixels that dwell longer on a viewer get darker tones: none, or dwell."""

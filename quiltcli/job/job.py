@@ -10,16 +10,21 @@ from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import (
     BeforeValidator,
+    ConfigDict,
     Discriminator,
     Field,
     PlainSerializer,
     PlainValidator,
     Tag,
     WithJsonSchema,
+    model_validator,
 )
 
 from quiltcli.channels import CHANNELS
+from quiltcli.errors import JobError
+from quiltcli.job.halftone import HalftoneSpec
 from quiltcli.job.layout import PackSpec, UvLayoutSpec
+from quiltcli.job.lights import MOST_RAYS
 from quiltcli.job.model import (
     YAMLS,
     AnyPath,
@@ -29,7 +34,9 @@ from quiltcli.job.model import (
     Listed,
     Model,
     OneOf,
+    Positive,
     ScenePath,
+    Unit,
     YamlPath,
     complaint,
     describe,
@@ -37,16 +44,21 @@ from quiltcli.job.model import (
     exactly_one,
 )
 from quiltcli.job.names import NamesSpec
+from quiltcli.job.ring import RingSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
-METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast")
+METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap", "tessellate")
+RING_METHODS = ("exact", "raycast", "vertex")
 DEPTH_BITS = ("16", "24", "32f")
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
 COMPRESSIONS = (*LOSSLESS, "pxr24", "b44", "b44a", "dwaa", "dwab", "lj2k")
 CLIPS = ("auto", "planar", "distance")
 STEREO = ("files", "parts")
+SIDES = ("all", "file")
+PARTS = ("layers", "parts")
 _NAME = re.compile(r"[\w-]+")
 MOST_SAMPLES = 4096
+MOST_TIMES = 256
 MOST_BLEED = 4096
 MOST_PLACES = 64
 UNLIT = ("write", "link", "skip")
@@ -123,13 +135,28 @@ def _bits(value: Any) -> Any:
     raise complaint(f"expected {either(DEPTH_BITS)}, or no such key, got {describe(value)}")
 
 
+class OcclusionSpec(Model):
+    """What keeps light from places that comes from everywhere."""
+
+    distance: Positive
+    """How far off it may stand, metres."""
+    samples: Annotated[int, Field(ge=1, le=MOST_RAYS)] = 32
+    """Directions in which it is looked for from a pixel; those below the horizon are not."""
+
+
 class RenderSpec(Model):
     """How pixels are made."""
 
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
-    method: Annotated[str, OneOf(METHODS)] = "homography"
-    """Render method."""
+    shutter: Unit = 0.0
+    """How long the shutter is open from the frame's time on, as a share of a frame: motion blur."""
+    motion_samples: Annotated[int, Field(ge=1, le=MOST_TIMES)] = 16
+    """Times at most at which the samples of a pixel look while the shutter is open."""
+    method: Annotated[str, OneOf((*METHODS, "exact", "vertex"))] = "homography"
+    """Render method; on a 360° light field display exact (so where the key is absent), raycast or vertex."""
+    tessellate: Positive | None = None
+    """With method: vertex, how far edges may bend before triangles are divided; 0.05 when absent, pixels."""
     depth_bits: Annotated[
         str | None, BeforeValidator(_bits), WithJsonSchema({"enum": [16, 24, "16", "24", "32f", None]})
     ] = None
@@ -141,6 +168,16 @@ class RenderSpec(Model):
     planar where depth is planar and every lit pixel of every frame lies ahead of the eye (auto)."""
     backface_culling: bool = False
     """Drop triangles that face away from the viewer."""
+    faces: Annotated[int, Field(ge=1, le=16384)] | None = None
+    """Width and height of the faces that method: cubemap looks pixels up in, 2048 when absent, pixels."""
+    shadows: bool = True
+    """Draw the shadows of lights that have them."""
+    ambient_occlusion: OcclusionSpec | None = None
+    """Darken places by what is near them, in light from everywhere that has no shadows."""
+    double_sided: Annotated[str, OneOf(SIDES)] = "all"
+    """Surfaces whose backs are seen: all, or those that their files call so (file)."""
+    threshold: Annotated[float, Field(ge=1e-4, le=1)] | None = None
+    """Longest edge on the display for method: tessellate, as a share of its size; 0.01 when absent."""
     bleed: Annotated[int, Field(ge=0, le=MOST_BLEED)] = 2
     """How far to render past a facet's edge, into the padding, pixels."""
     anisotropy: Annotated[int, Field(ge=1, le=MOST_PLACES)] = 16
@@ -158,9 +195,15 @@ class RenderSpec(Model):
     ] = Fraction(1)
     """Share of the display's pixels across and down, for proxies: 1/4; its layout is packed anew."""
 
+    @property
+    def averages(self) -> bool:
+        """Whether light is the mean of samples, and not that of the pixel's centre at the frame's time."""
+        return self.samples > 1 or self.shutter > 0
+
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        return "zv" in channels or self.depth_bits is not None or self.method not in ("homography", "raycast")
+        by_distance = ("homography", "raycast", "cubemap", "tessellate", *RING_METHODS)
+        return "zv" in channels or self.depth_bits is not None or self.method not in by_distance
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Rays have neither a depth buffer nor several samples; depth buffers lie between planes."""
@@ -169,8 +212,20 @@ class RenderSpec(Model):
             yield ("clip",), f"{what} needs a near and a far plane (expected planar or auto), got distance"
         if self.method == "raycast" and self.depth_bits is not None:
             yield ("depth_bits",), "rays have no depth buffer (expected no such key beside method: raycast)"
+        if self.tessellate is not None and self.method != "vertex":
+            yield ("tessellate",), f"belongs to method: vertex, got {self.method}"
+        if self.method != "cubemap" and self.faces is not None:
+            yield ("faces",), f"belongs to method: cubemap, got method: {self.method}"
+        if self.method != "tessellate" and self.threshold is not None:
+            yield ("threshold",), f"belongs to method: tessellate, got method: {self.method}"
+        if self.method == "tessellate" and self.samples > 1:
+            yield ("samples",), f"expected 1 beside method: tessellate, got {self.samples}"
+        if self.method == "cubemap" and self.depth_bits is not None:
+            yield ("depth_bits",), "a cube map has exact depth (expected no such key beside method: cubemap)"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
+        if self.method in ("raycast", "twopass") and self.shutter:
+            yield ("shutter",), f"expected 0 beside method: {self.method}, got {self.shutter:g}"
 
 
 class OutputSpec(Model):
@@ -182,6 +237,10 @@ class OutputSpec(Model):
     """Write quilt pages."""
     facets: bool = True
     """Write one image a facet."""
+    packed: bool = True
+    """Write the pictures of one bit that a 360° light field display shows, packed."""
+    tones: bool = False
+    """Write what they are made of, an image of every mirror position."""
     channels: Annotated[tuple[Annotated[str, OneOf(tuple(CHANNELS))], ...], Listed, Field(min_length=1)] = (
         "rgba",
         "Z",
@@ -191,6 +250,8 @@ class OutputSpec(Model):
     """OpenEXR compression."""
     stereo: Annotated[str, OneOf(STEREO)] = "files"
     """Two eyes' images: files of their own, or parts of one file."""
+    parts: Annotated[str, OneOf(PARTS)] = "layers"
+    """Channels of an image: layers of one part, or a part of the file each."""
     unlit: Annotated[str, OneOf(UNLIT)] = "write"
     """Images of facets that face away from the viewer: written, hard links to one of their size, or none."""
     data_window: Annotated[str, OneOf(DATA_WINDOWS)] = "full"
@@ -203,6 +264,10 @@ class OutputSpec(Model):
         if not (self.quilts or self.facets):
             yield (), "nothing to write (expected quilts or facets to be true)"
         yield from _twice(self.channels)
+        mattes = [name for name in self.channels if CHANNELS[name].matte]
+        if mattes and self.compression not in LOSSLESS:
+            words = f"{self.compression} alters the identities in {mattes[0]} (expected {either(LOSSLESS)})"
+            yield ("compression",), words
 
 
 def _twice(channels: Sequence[str]) -> Iterator[Complaint]:
@@ -234,6 +299,12 @@ def _shared_facets(viewers: Mapping[str, ViewerSpec]) -> Iterator[Complaint]:
         yield ("viewers", plain), words
 
 
+def _scene_or_lightfield(schema: dict[str, Any]) -> None:
+    """Either of the two is enough."""
+    schema["required"].remove("scene")
+    schema["anyOf"] = [{"required": ["scene"]}, {"required": ["lightfield"]}]
+
+
 class JobFile(FileModel):
     """A render job."""
 
@@ -242,7 +313,9 @@ class JobFile(FileModel):
         """Everybody who looks, by name; the only viewer has none."""
         if self.viewers is not None:
             return self.viewers
-        assert self.viewer is not None
+        if self.viewer is None:
+            words = "is for a 360° light field display; this needs facets (expected viewer or viewers)"
+            raise JobError(self.source.problem(("ring",), words))
         return {"": self.viewer}
 
     @property
@@ -252,7 +325,10 @@ class JobFile(FileModel):
 
     def cross_checks(self) -> Iterator[Complaint]:
         """One viewer or several, each facet for one; the canonical depth lies between two planes."""
-        yield from exactly_one(self, "viewer", "viewers")
+        yield from exactly_one(self, "viewer", "viewers", *(("ring",) if self.ring is not None else ()))
+        yield from self._ring_checks()
+        if self.lightfield is not None and self.scene != self.lightfield:
+            yield ("lightfield",), "cannot stand beside scene (expected one or the other)"
         if self.viewer is not None and self.viewer.facets is not None:
             yield ("viewer", "facets"), "belongs to one of several viewers (expected viewers: {NAME: …})"
         yield from _shared_facets(self.viewers or {})
@@ -262,7 +338,55 @@ class JobFile(FileModel):
         if self.render.clip == "distance" and "zv" in self.output.channels:
             words = "zv lies between a near and a far plane (expected planar or auto), got distance"
             yield ("render", "clip"), words
+        for index, name in enumerate(self.output.channels):
+            if self.render.method == "twopass" and (CHANNELS[name].matte or name == "motion"):
+                words = f"{name} cannot be resampled, which method: twopass does (expected another method)"
+                yield ("output", "channels", index), words
 
+    def _ring_checks(self) -> Iterator[Complaint]:
+        """What belongs to a ring of viewers alone, and what does not go with it."""
+        method = self.render.method
+        if self.ring is None:
+            if self.halftone is not None:
+                yield ("halftone",), "belongs to a 360° light field display (expected no such key)"
+            if self.lightfield is not None:
+                yield ("lightfield",), "belongs to a 360° light field display (expected scene)"
+            if method in ("exact", "vertex"):
+                yield ("render", "method"), f"expected {either(METHODS)} beside viewer, got {method}"
+            return
+        if "method" in self.render.model_fields_set and method not in RING_METHODS:
+            yield ("render", "method"), f"expected {either(RING_METHODS)} beside ring, got {method}"
+        if self.layout is not None:
+            yield ("layout",), "belongs to a display of facets (expected no such key beside ring)"
+        if self.render.scale != 1:
+            words = (
+                f"belongs to a display of facets (expected no such key beside ring), got {self.render.scale}"
+            )
+            yield ("render", "scale"), words
+        if self.lightfield is not None and self.render.samples > 1:
+            words = f"expected 1 beside lightfield, whose pictures are filtered, got {self.render.samples}"
+            yield ("render", "samples"), words
+        if self.render.scale != 1:
+            yield (
+                ("render", "scale"),
+                "belongs to displays of facets (expected a smaller image of the display)",
+            )
+        if self.render.depth_bits is not None:
+            yield ("render", "depth_bits"), "has no meaning on a ring of viewers (expected no such key)"
+        if not (self.output.packed or self.output.tones):
+            yield ("output",), "nothing to write (expected packed or tones to be true)"
+        if "rgba" not in self.output.channels:
+            yield ("output", "channels"), "expected rgba among them: light is made of it"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _content(cls, data: Any) -> Any:
+        """A light field is what is to be seen, too: it stands in the scene's place."""
+        if isinstance(data, dict) and "lightfield" in data and "scene" not in data:
+            return {**data, "scene": data["lightfield"]}
+        return data
+
+    model_config = ConfigDict(json_schema_extra=_scene_or_lightfield)
     kind: ClassVar[str] = "quilt_job"
 
     quilt_job: Annotated[int, Field(ge=1, le=1)] = 1
@@ -273,6 +397,8 @@ class JobFile(FileModel):
     """Layout file, or how to pack; the display's own layout or the packing defaults when absent."""
     scene: ScenePath
     """Scene file, or a mesh or glTF file."""
+    lightfield: YamlPath | None = None
+    """Light field file, photographs for a 360° light field display to show, instead of `scene`."""
     frames: FrameRange
     """Frames to render: 1-240, 1-9x2, 1,5,20-30."""
     fps: Annotated[
@@ -285,6 +411,10 @@ class JobFile(FileModel):
     """The viewer."""
     viewers: Annotated[dict[str, ViewerSpec], Field(min_length=1)] | None = None
     """Several viewers by name, each with facets of their own, instead of `viewer`."""
+    ring: RingSpec | None = None
+    """Viewers all around a 360° light field display, instead of `viewer`."""
+    halftone: HalftoneSpec | None = None
+    """How tones become bits on a 360° light field display; the defaults when absent."""
     render: RenderSpec = RenderSpec()
     """How pixels are made."""
     output: OutputSpec = OutputSpec()

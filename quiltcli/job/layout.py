@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic import ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
 
 from quiltcli.errors import JobError
 from quiltcli.job.model import (
@@ -178,6 +178,7 @@ class PackedSpec(Model):
 class LayoutFile(FileModel):
     """Where each facet's pixels lie in the quilt."""
 
+    model_config = ConfigDict(json_schema_extra=lambda schema: schema["required"].remove("facets"))
     kind: ClassVar[str] = "quilt_layout"
 
     quilt_layout: Annotated[int, Field(ge=1, le=1)] = 1
@@ -192,15 +193,33 @@ class LayoutFile(FileModel):
     """Room kept free between facets, pixels."""
     pages: Annotated[tuple[PageSpec, ...], Listed, Field(min_length=1)]
     """Pages of the quilt."""
-    facets: Annotated[tuple[PlaceSpec, ...], Listed, Field(min_length=1)]
+    facets: Annotated[tuple[PlaceSpec, ...], Listed, Field(min_length=1)] | None
     """Places of the facets."""
+    columns: AnyPath | None = None
+    """NumPy archive (.npz) with the facets, an array a key, in place of `facets`: for thousands of them."""
+    columns_sha256: Sha256 | None = None
+    """Hash of that file, which is read only while it is the same."""
     packed: PackedSpec | None = None
     """What it was packed from, as a render notes it; absent in others."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _facets_in_columns(cls, data: Any) -> Any:
+        """Nothing is missing where columns stand for the facets."""
+        if isinstance(data, dict) and "columns" in data and "facets" not in data:
+            return {**data, "facets": None}
+        return data
+
     def cross_checks(self) -> Iterator[Complaint]:
-        """Ids are unique, pages exist, no map flattens its facet."""
+        """The facets stand in one place; ids are unique, pages exist, no map flattens its facet."""
+        if self.facets is None and self.columns is None:
+            yield ("facets",), "no facets (expected a list, or columns with a file that has them)"
+        elif self.facets is not None and self.columns is not None:
+            yield ("columns",), "facets and columns: give one, since columns has the facets too"
+        elif self.columns is None and self.columns_sha256 is not None:
+            yield ("columns_sha256",), "a hash of columns, but no columns"
         first: dict[int, int] = {}
-        for i, place in enumerate(self.facets):
+        for i, place in enumerate(self.facets or ()):
             if place.id in first:
                 yield (
                     ("facets", i, "id"),

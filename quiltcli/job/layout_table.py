@@ -3,7 +3,7 @@
 What this program writes has one line a key and the same eight keys for every facet. Such lines are
 read as they stand, columns at a time, which takes a hundredth of the time that YAML takes. A file in
 any other form, or with anything in it that is not right, is read as YAML, which says what is wrong
-and where.
+and where. The facets of a large layout stand as columns in a file of their own.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ import numpy as np
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.yaml.source import Source, parse_text
 from quiltcli.formats.yaml.syntax import read_text
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, some_rows
+from quiltcli.geometry import FloatArray, Int32Array, IntArray, offsets, some_rows
 from quiltcli.job.layout import LayoutFile
+from quiltcli.job.layout_columns import ColumnLines, Columns, read_columns
 from quiltcli.job.load import layout_of, load_layout_file
 
 FACET_KEYS = ("id", "page", "size", "quilt_from_facet", "origin", "du", "dv", "polygon")
@@ -94,7 +95,7 @@ class LayoutTable(Places):
     """
 
     head: LayoutFile
-    source: Source | LayoutLines
+    source: Source | LayoutLines | ColumnLines
 
 
 @dataclass(frozen=True)
@@ -136,9 +137,55 @@ def places_sha256(places: Places) -> str:
 
 
 def table_of(spec: LayoutFile) -> LayoutTable:
-    """Columns of a validated layout file."""
-    columns = {key: [getattr(facet, key) for facet in spec.facets] for key in FACET_KEYS}
+    """Columns of a validated layout file.
+
+    Raises:
+        JobError: the columns stand in a file of their own, and that cannot be read or is wrong.
+    """
+    if spec.columns is not None:
+        return _from_columns(spec, read_columns(spec.columns, len(spec.pages), spec.columns_sha256))
+    columns = {key: [getattr(facet, key) for facet in spec.facets or ()] for key in FACET_KEYS}
     return _table(spec, spec.source, columns)
+
+
+def columns_of(places: Places) -> Columns:
+    """The columns of a file for the facets that have a page; see `quiltcli.job.layout_columns`."""
+    placed = places.taken(np.flatnonzero(places.page >= 0))
+    whole = {
+        "id": placed.facet,
+        "page": placed.page + 1,
+        "size": placed.size,
+        "corners": np.diff(placed.corner_start),
+    }
+    exact = {name: getattr(placed, name) for name in ("quilt_from_facet", "origin", "du", "dv", "polygon")}
+    columns: Columns = {name: values.astype("<i4") for name, values in whole.items()}
+    return columns | {name: values.astype("<f8") for name, values in exact.items()}
+
+
+def _from_columns(head: LayoutFile, columns: Columns) -> LayoutTable:
+    assert head.columns is not None
+    return LayoutTable(
+        head=head,
+        source=ColumnLines(head.columns),
+        facet=columns["id"].astype(np.int32),
+        page=(columns["page"] - 1).astype(np.int32),
+        size=columns["size"].astype(np.int32),
+        quilt_from_facet=columns["quilt_from_facet"],
+        origin=columns["origin"],
+        du=columns["du"],
+        dv=columns["dv"],
+        corner_start=offsets(columns["corners"]),
+        polygon=columns["polygon"],
+        **_on_pages(head),
+    )
+
+
+def _on_pages(head: LayoutFile) -> dict[str, Any]:
+    """What a table takes from the file's other keys."""
+    return {
+        "pages": np.array([page.size for page in head.pages], dtype=np.int32),
+        "padding": head.padding,
+    }
 
 
 def _table(head: LayoutFile, source: Source | LayoutLines, columns: dict[str, list[Any]]) -> LayoutTable:
@@ -156,8 +203,7 @@ def _table(head: LayoutFile, source: Source | LayoutLines, columns: dict[str, li
         dv=np.array(columns["dv"], dtype=np.float64),
         corner_start=np.cumsum([0, *map(len, polygons)]),
         polygon=np.array(corners, dtype=np.float64),
-        pages=np.array([page.size for page in head.pages], dtype=np.int32),
-        padding=head.padding,
+        **_on_pages(head),
     )
 
 

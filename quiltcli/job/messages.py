@@ -52,8 +52,11 @@ def _unknown(key: Key, siblings: Sequence[type[BaseModel]], root: type[BaseModel
     """Unknown key: the nearest known one, or where it belongs, or what there is."""
     if key == ("$schema",):
         return "unknown key (name the schema in a first line '# yaml-language-server: $schema=FILE')"
-    names = [name for model in siblings for name in model.model_fields]
+    names = [field.alias or name for model in siblings for name, field in model.model_fields.items()]
     elsewhere = [path for path in _all_keys(root) if path.rpartition(".")[2] == key[-1]]
+    # What is part of a part of another key's is meant less often.
+    least = min((path.count(".") for path in elsewhere), default=0)
+    elsewhere = [path for path in elsewhere if path.count(".") <= max(least, 1)]
     if len(elsewhere) == 1:
         return f"unknown key here (did you mean {elsewhere[0]!r}?)"
     near = suggest(key[-1], names)
@@ -213,5 +216,8 @@ def version_problem(data: dict[Any, Any], kind: str, source: Source) -> Problem 
     return None
 
 
-KINDS = ("quilt_display", "quilt_layout", "quilt_scene", "quilt_job")
+KINDS = (
+    *("quilt_display", "quilt_layout", "quilt_scene", "quilt_job"),
+    *("quilt_lightfield", "quilt_calibration"),
+)
 NO_KIND = f"this is no file of quilt's (expected {either([f'{kind}: 1' for kind in KINDS])} as the first key)"

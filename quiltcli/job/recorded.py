@@ -99,6 +99,8 @@ class GapsSpec(Model):
     """Longer gaps: an error where a frame falls into one, or the last pose held."""
     jump: Positive = 3.0
     """Speed above which two neighbouring samples are a jump, m/s; one that comes back is a lost sample."""
+    jump_deg: Positive = 2000.0
+    """The same of turning: a sample turned away faster that comes back is a lost sample, degrees a second."""
 
 
 class MarkerSpec(Model):

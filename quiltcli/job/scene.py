@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import BeforeValidator, Field
 
 from quiltcli.geometry import FloatArray
 from quiltcli.job.display import Units
 from quiltcli.job.lengths import UNITS, UpAxis, up_matrix
+from quiltcli.job.lights import LightSpec, listed_lights
 from quiltcli.job.model import (
     Complaint,
-    Direction,
     ExistingFile,
     FileModel,
     Listed,
@@ -25,11 +25,8 @@ from quiltcli.job.model import (
     Rgb,
     Unit,
     Vec2,
-    Vec3,
     complaint,
     describe,
-    either,
-    suggest,
 )
 from quiltcli.job.placement import PlacementSpec
 from quiltcli.job.sequence import MeshOrSequence, MeshSequence, is_pattern
@@ -94,6 +91,14 @@ class MaterialSpec(Model):
     """Show exactly `color`, whatever the lights."""
     specular: Unit | None = None
     """1 for a surface that also reflects the lamps themselves, 0 for a matte one; metals always do."""
+    opacity: Unit | None = None
+    """How much light the surface holds up: 1 all, 0 none."""
+    alpha: Annotated[str, OneOf(("opaque", "mask", "blend"))] | None = None
+    """What opacity means: nothing (opaque), there or not (mask), or a share of light (blend)."""
+    cutoff: NotNegative | None = None
+    """The least opacity that a mask shows; 0.5 when neither this nor the mesh file says."""
+    double_sided: bool | None = None
+    """Whether its back is seen, in jobs with `render.double_sided: file`."""
     textures: TexturesSpec | None = None
     """Pictures that vary the material; they multiply `color`, `emission`, `metallic` and `roughness`."""
 
@@ -163,6 +168,8 @@ class ObjectSpec(Model):
     """Shade each triangle flat, smooth over the vertices, or (auto) as the mesh file says."""
     animation: AnimationSpec | None = None
     """Play the animation in the mesh file; without this key it rests."""
+    casts_shadows: bool = True
+    """Whether it stands in the way of lights that have shadows."""
 
     def world_from_mesh(self, frame: float | None = None) -> FloatArray | None:
         """World from mesh (4, 4) at a frame, or at its start: units, up axis, transform.
@@ -204,94 +211,6 @@ class ObjectSpec(Model):
             yield ("animation",), "cannot stand beside frames (a sequence has one pose a file)"
 
 
-class DirectionalLight(Model):
-    """Light from infinitely far away."""
-
-    type: Literal["directional"] = "directional"
-    """Kind of light."""
-    direction: Direction
-    """The way the light travels."""
-    color: Rgb = (1.0, 1.0, 1.0)
-    """Irradiance on a plane that faces the light."""
-
-
-class PointLight(Model):
-    """Light from one point, falling with the square of the distance."""
-
-    type: Literal["point"] = "point"
-    """Kind of light."""
-    position: Vec3
-    """Place, metres."""
-    color: Rgb = (1.0, 1.0, 1.0)
-    """Radiant intensity."""
-
-
-class AmbientLight(Model):
-    """The same light from everywhere."""
-
-    type: Literal["ambient"] = "ambient"
-    """Kind of light."""
-    color: Rgb = (0.1, 0.1, 0.1)
-    """Radiance."""
-
-
-class FileLights(Model):
-    """The lights in the objects' mesh files (glTF), each where its object is."""
-
-    type: Literal["file"] = "file"
-    """Kind of light."""
-    scale: NotNegative = 1.0
-    """Factor of their strength: 1 takes lux and candela by 683 lumens a watt, as exporters make them."""
-
-
-LIGHTS = {
-    "directional": DirectionalLight,
-    "point": PointLight,
-    "ambient": AmbientLight,
-    "file": FileLights,
-}
-
-
-def _check_type(value: Any) -> Any:
-    """A light must say which kind it is before its keys can be judged."""
-    if not isinstance(value, (dict, Model)):
-        raise complaint(f"expected a light such as {{type: ambient}}, got {describe(value)}")
-    kind = value.get("type") if isinstance(value, dict) else value.__dict__["type"]
-    if kind is None:
-        raise complaint(f"missing key (expected {either(list(LIGHTS))})", "type")
-    if kind not in tuple(LIGHTS):
-        near = suggest(kind, LIGHTS)
-        hint = f" (did you mean {near!r}?)" if near else ""
-        raise complaint(f"expected {either(list(LIGHTS))}, got {describe(kind)}{hint}", "type")
-    return value
-
-
-def _light_tag(value: Any) -> str:
-    kind = value["type"] if isinstance(value, dict) else value.type
-    return f"<{LIGHTS[kind].__name__}>"
-
-
-LightSpec: TypeAlias = Annotated[
-    Annotated[DirectionalLight, Tag("<DirectionalLight>")]
-    | Annotated[PointLight, Tag("<PointLight>")]
-    | Annotated[AmbientLight, Tag("<AmbientLight>")]
-    | Annotated[FileLights, Tag("<FileLights>")],
-    Discriminator(_light_tag),
-    BeforeValidator(_check_type),
-]
-
-
-def _listed_lights(value: Any) -> Any:
-    """`lights: file` is short for a list of that one entry."""
-    if value == "file":
-        return ({"type": "file"},)
-    if not isinstance(value, (list, tuple)):
-        near = suggest(value, ("file",)) if isinstance(value, str) else ""
-        hint = f" (did you mean {near!r}?)" if near else ""
-        raise complaint(f"expected file or a list of lights, got {describe(value)}{hint}")
-    return tuple(value)
-
-
 class SceneFile(FileModel):
     """What is to be seen."""
 
@@ -301,7 +220,23 @@ class SceneFile(FileModel):
     """Version of the format."""
     objects: Annotated[tuple[ObjectSpec, ...], Listed, Field(min_length=1)]
     """Meshes."""
-    lights: Annotated[tuple[LightSpec, ...], BeforeValidator(_listed_lights)] = ()
+    lights: Annotated[tuple[LightSpec, ...], BeforeValidator(listed_lights)] = ()
     """Lights, or `file` for those of the meshes; a headlight and a dim ambient light when there are none."""
     background: Rgb = (0.0, 0.0, 0.0)
     """Colour where nothing is hit, linear."""
+
+    def without_shadows(self) -> SceneFile:
+        """The same with lights that shine through everything."""
+        return self._lit(light.model_copy(update={"shadows": False}) for light in self.lights)
+
+    def with_ambient_occlusion(self, distance: float, rays: int) -> SceneFile:
+        """The same; what is near a place keeps light from it that comes from everywhere."""
+        update = {"shadows": True, "distance": distance, "rays": rays}
+        open_to_all = ("ambient", "environment")
+        return self._lit(
+            light.model_copy(update=update) if light.type in open_to_all and not light.shadows else light
+            for light in self.lights
+        )
+
+    def _lit(self, lights: Iterable[LightSpec]) -> SceneFile:
+        return self.model_copy(update={"lights": tuple(lights)})

@@ -1,4 +1,4 @@
-"""JSON Schemas of the four file kinds, for editors that check YAML while it is typed.
+"""JSON Schemas of the kinds of file, for editors that check YAML while it is typed.
 
 `python -m quiltcli.job.schema docs/schema` writes them. A YAML file names its schema in a comment,
 `# yaml-language-server: $schema=FILE`, which editors with that language server read; files that come
@@ -21,7 +21,7 @@ def schemas() -> dict[str, str]:
 
 
 def schema_text(name: str) -> str:
-    """Text of the schema of `job`, `display`, `layout` or `scene` files."""
+    """Text of the schema of a kind of file: `job`, `display` and so on."""
     return _text(f"quilt_{name}")
 
 
@@ -38,7 +38,7 @@ def schema_of(kind: str) -> dict[str, Any]:
     schema: dict[str, Any] = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     schema.update(model.model_json_schema(by_alias=True))
     # Python code may leave the version out; a file must not.
-    schema["required"] = [kind, *schema.get("required", [])]
+    schema["required"] = [model.kind, *schema.get("required", [])]
     schema["title"] = f"{kind} file"
     return schema
 

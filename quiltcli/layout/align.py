@@ -10,7 +10,7 @@ import numpy as np
 from quiltcli.display import Facets, corner_pixels
 from quiltcli.errors import LayoutError, Problem, raise_all
 from quiltcli.geometry import FloatArray, IntArray, dot, segments
-from quiltcli.layout.layout import Layout
+from quiltcli.layout.layout import Layout, whole_pixel
 
 _OFF_PLANE = 2e-4  # of a facet's size: twice what a face may be out of plane
 
@@ -31,6 +31,7 @@ def align(layout: Layout, facets: Facets) -> Layout:
     """
     raise_all(LayoutError, _strangers(layout, facets))
     raise_all(LayoutError, misfits(layout, facets))
+    raise_all(LayoutError, _sheared(layout, facets))
     row = np.full(facets.count, -1)
     row[layout.facet - 1] = np.arange(layout.facet.size)
     known = row >= 0
@@ -50,7 +51,22 @@ def align(layout: Layout, facets: Facets) -> Layout:
         corner_start=facets.corner_start,
         polygon=_polygons(layout, facets, row),
         file_row=None if layout.file_row is None else np.where(known, layout.file_row[row], 0),
+        masks={
+            number: chart.mask
+            for number, chart in enumerate(facets.charts, 1)
+            if chart is not None and chart.mask is not None
+        },
     )
+
+
+def _sheared(layout: Layout, facets: Facets) -> Iterator[Problem]:
+    """Curved facets whose pixels are not the quilt's: theirs are what has places in the world."""
+    if not facets.charts:
+        return
+    curved = facets.curved[layout.facet - 1] & (layout.page >= 0)
+    for row in np.flatnonzero(curved & ~whole_pixel(layout)).tolist():
+        message = f"facet {layout.facet[row]} is curved, and must move by whole pixels and quarter turns"
+        yield layout.problem(message, row, "quilt_from_facet")
 
 
 def _polygons(layout: Layout, facets: Facets, row: IntArray) -> FloatArray:

@@ -1,4 +1,7 @@
-"""The layout file: YAML that people read and every bit of the numbers survives."""
+"""The layout file: YAML that people read and every bit of the numbers survives.
+
+The facets of a large layout stand in a file of their own beside it, as columns of numbers.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,15 @@ import numpy as np
 from pydantic import ValidationError
 
 from quiltcli.errors import Problem
-from quiltcli.formats.whole import write_text
+from quiltcli.formats.whole import write_text, write_whole
 from quiltcli.formats.yaml.source import Source
-from quiltcli.job.layout_table import LayoutTable, Places, read_layout_table
+from quiltcli.job.layout_columns import columns_bytes
+from quiltcli.job.layout_table import LayoutTable, Places, columns_of, read_layout_table
 from quiltcli.layout.check import check_layout
 from quiltcli.layout.layout import Layout, Packed
+
+MOST_AS_TEXT = 4096
+"""Facets that stand in the layout file itself."""
 
 _COLUMNS = ("size", "quilt_from_facet", "origin", "du", "dv")
 
@@ -87,20 +94,35 @@ def _plain(layout: Layout) -> dict[str, object]:
 def write_layout(layout: Layout, path: str | Path) -> None:
     """Write the layout file, whole or not at all.
 
-    The display is named relative to the file's folder, so that the two can move together.
+    The display is named relative to the file's folder, so that the two can move together. More than
+    `MOST_AS_TEXT` facets are written to a second file, `NAME.columns.npz`, that the layout file names.
 
     Raises:
         OutputError: the file cannot be written.
     """
     path = Path(path)
-    write_text(path, layout_text(layout, path.parent))
+    if np.count_nonzero(layout.page >= 0) <= MOST_AS_TEXT:
+        write_text(path, layout_text(layout, path.parent))
+        return
+    data, digest = columns_bytes(columns_of(layout))
+    beside = path.with_name(f"{path.stem}.columns.npz")
+    write_whole(beside, data)
+    facets = [f"columns: {json.dumps(beside.name, ensure_ascii=False)}", f"columns_sha256: {digest}"]
+    write_text(path, _text(layout, path.parent, facets))
 
 
 def layout_text(layout: Layout, folder: str | Path = ".") -> str:
-    """The layout file's text, as it would be written to `folder`.
+    """The layout file's text, facets and all, as it would be written to `folder`.
 
     Facets without a place are left out. Numbers are the shortest text that reads back as the same float64.
     """
+    rows = np.flatnonzero(layout.page >= 0).tolist()
+    facets = ["facets:" if rows else "facets: []"]
+    return _text(layout, folder, [*facets, *(line for row in rows for line in _facet_lines(layout, row))])
+
+
+def _text(layout: Layout, folder: str | Path, facets: list[str]) -> str:
+    """The file's text around the lines that tell of the facets."""
     lines = [
         "quilt_layout: 1",
         *_display_lines(layout, folder),
@@ -108,11 +130,9 @@ def layout_text(layout: Layout, folder: str | Path = ".") -> str:
         f"padding: {layout.padding}",
         "pages:",
         *(f"- size: {_flow(size)}" for size in layout.pages),
-        "facets:" if (layout.page >= 0).any() else "facets: []",
+        *facets,
+        *_packed_lines(layout),
     ]
-    for row in np.flatnonzero(layout.page >= 0):
-        lines += _facet_lines(layout, int(row))
-    lines += _packed_lines(layout)
     return "\n".join(lines) + "\n"
 
 

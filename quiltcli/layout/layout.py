@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol, Self
 
@@ -47,6 +47,7 @@ class Layout(Places):
         path: the layout file it was read from, empty when it was made by the program.
         place: finds lines in that file, None when it was made by the program.
         file_row: (F,) row of each facet in the file, None when it was made by the program.
+        masks: by facet id, the pixels (H, W) of facets that are not all there.
     """
 
     method: str
@@ -56,6 +57,7 @@ class Layout(Places):
     path: str = ""
     place: Place | None = field(default=None, repr=False)
     file_row: IntArray | None = field(default=None, repr=False)
+    masks: Mapping[int, BoolArray] = field(default_factory=dict, repr=False)
 
     @property
     def page_offset(self) -> IntArray:

@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import LayoutError
 from quiltcli.formats.capacity import bytes_text, free_memory
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, next_in_row, offsets, segments, shares
+from quiltcli.geometry import (
+    BoolArray,
+    FloatArray,
+    Int32Array,
+    IntArray,
+    next_in_row,
+    offsets,
+    segments,
+    shares,
+)
 from quiltcli.layout.layout import Layout, quilt_polygons
 from quiltcli.layout.spans import Spans, facet_spans, overlaps, snapped
 
@@ -41,7 +50,25 @@ def pixel_owners(layout: Layout, bleed: float = 0) -> Owners:
     owners = _fill_runs(layout, spans)
     if bleed > 0:
         _add_bleed(layout, owners, bleed)
+    for row in np.flatnonzero(layout.page >= 0).tolist():
+        mask = layout.masks.get(int(layout.facet[row]))
+        if mask is not None:
+            _leave_out(layout, row, mask, owners)
     return owners
+
+
+def _leave_out(layout: Layout, row: int, mask: BoolArray, owners: Owners) -> None:
+    """Take from a facet the pixels that are not in its mask (H, W), in place; they are nobody's then."""
+    page = int(layout.page[row])
+    width, height = layout.pages[page].tolist()
+    first = int(layout.page_offset[page])
+    mine = owners[first : first + width * height].reshape(height, width)
+    y, x = np.nonzero(mine == layout.facet[row])
+    (a, b, c), (d, e, f) = np.linalg.inv(np.vstack((layout.quilt_from_facet[row], [0, 0, 1])))[:2]
+    i = np.floor(a * (x + 0.5) + b * (y + 0.5) + c).astype(np.int64).clip(0, mask.shape[1] - 1)
+    j = np.floor(d * (x + 0.5) + e * (y + 0.5) + f).astype(np.int64).clip(0, mask.shape[0] - 1)
+    gone = ~mask[j, i]
+    mine[y[gone], x[gone]] = 0
 
 
 def owner_bytes(layout: Layout) -> int:

@@ -162,6 +162,14 @@ def viewer_frustum(viewer: Viewer, facets: Facets, lit: BoolArray) -> tuple[floa
     return max(wide, 1e-6), max(high, 1e-6)
 
 
+def beyond_frustum(viewer: Viewer, facets: Facets, lit: BoolArray) -> bool:
+    """Whether lit facets reach beyond the widest frustum that `viewer_frustum` opens."""
+    row, _ = segments(facets.corner_start)
+    x, y, ahead = _tangents(viewer, (facets.corners - viewer.eye)[lit[row]])
+    widest = math.tan(math.radians(WIDEST) / 2) * (1 + 1e-9)
+    return not (ahead.all() and (np.abs(x) <= widest).all() and (np.abs(y) <= widest).all())
+
+
 def _tangents(camera: Viewer, local: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Slopes to the right and up (C,) of points relative to the eye, and whether they lie ahead."""
     depth = dot(local, camera.look)

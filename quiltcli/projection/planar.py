@@ -11,11 +11,18 @@ axes: the picture on a facet does not depend on which way the viewer looks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from quiltcli.display import Facets
 from quiltcli.geometry import BoolArray, FloatArray, cross, dot
 from quiltcli.layout import Layout
+from quiltcli.projection.curved import ChartView, chart_views
+from quiltcli.viewer.viewer import Viewer
+
+if TYPE_CHECKING:
+    from quiltcli.projection.patches import Patched
 
 
 @dataclass(frozen=True)
@@ -28,27 +35,42 @@ class QuiltRays:
         eye_from_quilt: (F, 3, 3) page pixel (x, y, 1) → direction from the eye, world axes; a
             direction ends on the facet's plane.
         quilt_from_eye: (F, 3, 3) point minus eye → homogeneous page pixel (X, Y, W).
+        views: of every facet what the eye sees of its chart, None where it is flat and the matrices hold;
+            empty where all are.
+        patched: curved facets in flat patches, once they have been cut for drawing.
     """
 
     eye: FloatArray
     lit: BoolArray
     eye_from_quilt: FloatArray
     quilt_from_eye: FloatArray
+    views: tuple[ChartView | None, ...] = ()
+    patched: Patched | None = None
 
 
-def quilt_rays(layout: Layout, lit: BoolArray, eye: FloatArray) -> QuiltRays:
+def quilt_rays(
+    layout: Layout, lit: BoolArray, eye: FloatArray, views: tuple[ChartView | None, ...] = ()
+) -> QuiltRays:
     """Rays of `eye` through every facet's place in the quilt.
 
     Args:
         layout: the facets' places, one row a facet.
         lit: (F,) facets whose lit side faces the eye.
         eye: (3,) world metres.
+        views: what the eye sees of curved facets.
     """
     drawn = lit & (layout.page >= 0)
     rays = eye_from_quilt(layout, eye)
     inverse = np.zeros_like(rays)
-    inverse[drawn] = inverse_3x3(rays[drawn])
-    return QuiltRays(eye, drawn, rays, inverse)
+    flat = drawn & np.array([view is None for view in views]) if views else drawn
+    inverse[flat] = inverse_3x3(rays[flat])
+    return QuiltRays(eye, drawn, rays, inverse, views)
+
+
+def viewer_rays(layout: Layout, facets: Facets, lit: BoolArray, viewer: Viewer) -> QuiltRays:
+    """Rays of a viewer's eye through every facet's place in the quilt; curved facets have their charts'."""
+    views = chart_views(facets.charts, layout, viewer.eye, viewer.camera_from_world) if facets.charts else ()
+    return quilt_rays(layout, lit, viewer.eye, views)
 
 
 def eye_from_quilt(layout: Layout, eye: FloatArray) -> FloatArray:

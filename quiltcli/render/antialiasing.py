@@ -15,18 +15,23 @@ ids and other data are those of the pixel's centre.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
-from quiltcli.channels import CHANNELS, MOST_HALF
-from quiltcli.geometry import Float32Array, FloatArray
+from quiltcli.geometry import BoolArray, FloatArray
 from quiltcli.layout import Layout
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.setup import Stage
-from quiltcli.shading.aovs import light_at_points, shaded_for, wanted_for
+from quiltcli.render.sums import Sums, new_sums
+from quiltcli.shading.aovs import shaded_for, wanted_for
+from quiltcli.shading.layers import layers
+from quiltcli.shading.once import may_be_once, shaded_once
+from quiltcli.shading.shadows import Sample
 from quiltcli.visibility.draw import Cells, Frame, draw
 
+_WORTH_SETTLING = 3  # samples; fewer are looked at faster one by one
 _LONGEST = 5  # times as wide as high a cell's grid may be
 _TURN = 1e-6  # by which a map's linear part may be off a whole turn
 _LATTICES = {
@@ -54,11 +59,6 @@ _LATTICES = {
 }
 
 
-def averaged(channels: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of the channels that are light, whose samples are averaged."""
-    return tuple(name for name in channels if CHANNELS[name].averaged)
-
-
 def draw_samples(
     stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, channels: tuple[str, ...]
 ) -> None:
@@ -69,56 +69,79 @@ def draw_samples(
         frame: the frame.
         batch: the range of blocks.
         buffers: written to, at every pixel that any sample sees.
-        channels: some of `averaged`.
+        channels: some of `sums.summed`.
     """
-    sums = _Sums(stage, batch, channels)
-    scene, eye = stage.scene, frame.viewer.eye
-    count = stage.job.render.samples
-    for sample in sample_places(count):
-        place, cells = in_quilt(stage.layout, sample), None
+    sums, count = new_batch_sums(stage, batch, channels), stage.job.render.samples
+    add_samples(stage, frame, batch, sums, sample_places(count))
+    sums.store(buffers, count, stage.scene.background)
+
+
+def add_samples(
+    stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums, places: Sequence[tuple[float, float]]
+) -> None:
+    """Add samples of a batch to sums.
+
+    Args:
+        stage: what the job's frames share.
+        frame: the frame.
+        batch: the range of blocks.
+        sums: added to.
+        places: the samples' places in a pixel, from its centre.
+    """
+    scene, wanted, count = stage.scene, wanted_for(sums.channels, stage.scene), stage.job.render.samples
+    done = None
+    if len(places) >= _WORTH_SETTLING and frame.order is None and may_be_once(scene):
+        done = _add_settled(stage, frame, batch, sums, len(places))
+    for place in places:
+        sample = Sample(sample_places(count).index(place), count)
+        cells = None
         if scene.textures is not None:
-            cells = cells_in_quilt(stage.layout, *cell_of(sample, count))
-        drawing = draw(frame, batch, place, cells)
-        for shaded in shaded_for(channels, drawing, wanted_for(channels, scene), scene, eye):
-            pixel = shaded.hits.pixel - sums.first
-            sums.hits[pixel] += 1
-            for name in channels:
-                for values, total in zip(light_at_points(name, shaded), sums.light[name], strict=True):
-                    total[pixel] += shaded.hits.drawn(np.minimum(values, MOST_HALF))
+            cells = cells_in_quilt(stage.layout, *cell_of(place, count))
+        drawing = draw(frame, batch, in_quilt(stage.layout, place), cells, done=done)
+        for shaded in shaded_for(sums.channels, drawing, wanted, scene, frame.viewer.eye, sample):
+            sums.add(shaded)
+        for layer in layers(drawing, wanted, scene, frame.viewer.eye, sample):
+            sums.add(layer.shaded, layer.weight)
         drawing.done()
-    sums.store(buffers, count, scene.background)
 
 
-class _Sums:
-    """Sums over the samples of a batch's pixels, from the first to the last address that is a pixel of it.
+def _add_settled(stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums, times: int) -> BoolArray:
+    """Add what all of so many samples see alike: smooth light where one triangle is all they can see.
+
+    The mean of smooth light over a pixel is that of its centre, nearly: it is worked out once for a triangle
+    and pixel, as multisampling does. Where it is not smooth, at glints and shadows' edges, samples are looked
+    at one by one.
+
+    Returns:
+        (m,) the microtiles of the batch's blocks in which nothing is left to be looked at.
+    """
+    scene, blocks = stage.scene, stage.blocks
+    tiles = blocks.tiles(batch)
+    done = np.zeros(tiles.stop - tiles.start, dtype=np.bool_)
+    drawing = draw(frame, batch, settled=True)
+    wanted = wanted_for(sums.channels, scene)
+    for shaded, number in shaded_once(drawing.regions(wanted, scene), scene, frame.viewer.eye):
+        sums.add(shaded, times=times)
+        done[number - tiles.start] = True
+    drawing.done()
+    return done
+
+
+def new_batch_sums(stage: Stage, batch: tuple[int, int], channels: tuple[str, ...]) -> Sums:
+    """Sums of channels for the pixels of a batch."""
+    first, size = _addresses(stage, batch)
+    return Sums(new_sums(channels, lambda dtype: np.zeros(size, dtype)), channels, first)
+
+
+def _addresses(stage: Stage, batch: tuple[int, int]) -> tuple[int, int]:
+    """The first address of a batch's pixels, and how many there are up to the last.
 
     Addresses between that belong to other batches are memory that is never touched, and costs nothing.
     """
-
-    def __init__(self, stage: Stage, batch: tuple[int, int], channels: tuple[str, ...]) -> None:
-        blocks, block = stage.blocks, np.arange(*batch)
-        ends = blocks.address[block] + (blocks.height[block] - 1) * blocks.stride[block] + blocks.width[block]
-        self.first = int(blocks.address[block].min())
-        size = int(ends.max()) - self.first
-        self.hits = np.zeros(size, dtype=np.uint16)
-        self.light = {name: [np.zeros(size, dtype=np.float32) for _ in range(3)] for name in channels}
-
-    def store(self, buffers: Buffers, count: int, background: Float32Array) -> None:
-        """Write the means into the pixels of which any sample sees something."""
-        pixel = np.flatnonzero(self.hits)
-        seen = self.hits[pixel].astype(np.float32)
-        for name, totals in self.light.items():
-            layers = CHANNELS[name].layers
-            for k, (layer, total) in enumerate(zip(layers, totals, strict=False)):
-                values = total[pixel]
-                if name == "rgba":
-                    values += (count - seen) * background[k]
-                self._put(buffers, layer, pixel, values / np.float32(count))
-            if name == "rgba":
-                self._put(buffers, "A", pixel, seen / np.float32(count))
-
-    def _put(self, buffers: Buffers, layer: str, pixel: np.ndarray, values: Float32Array) -> None:
-        buffers[layer][pixel + self.first] = np.minimum(values, MOST_HALF).astype(np.float16)
+    blocks, block = stage.blocks, np.arange(*batch)
+    ends = blocks.address[block] + (blocks.height[block] - 1) * blocks.stride[block] + blocks.width[block]
+    first = int(blocks.address[block].min())
+    return first, int(ends.max()) - first
 
 
 def in_quilt(layout: Layout, sample: tuple[float, float]) -> FloatArray:
@@ -178,6 +201,37 @@ def sample_places(samples: int) -> tuple[tuple[float, float], ...]:
     return tuple(
         ((i + 0.5) / samples - 0.5, (i * step % samples + 0.5) / samples - 0.5) for i in range(samples)
     )
+
+
+@lru_cache(maxsize=8)
+def sample_times(samples: int, most: int) -> tuple[tuple[float, tuple[tuple[float, float], ...]], ...]:
+    """The samples by the times at which they look, as shares of an exposure, ascending.
+
+    Sample i looks at ((i·b mod N) + ½)/N, the third coordinate of a rank-1 lattice; with more samples than
+    `most` times, at the middle of the share of the exposure in which that lies.
+    """
+    places, step = sample_places(samples), time_step(samples)
+    count = min(samples, most)
+    groups: list[list[tuple[float, float]]] = [[] for _ in range(count)]
+    for i, place in enumerate(places):
+        groups[(2 * (i * step % samples) + 1) * count // (2 * samples)].append(place)
+    return tuple(((k + 0.5) / count, tuple(group)) for k, group in enumerate(groups))
+
+
+def time_step(samples: int) -> int:
+    """The step `b` of times with which the nearest points of place and time are farthest apart."""
+    step = _LATTICES.get(samples) or best_step(samples)
+    i = np.arange(1, samples)
+    across = np.minimum(i, samples - i) ** 2
+    down = i * step % samples
+    across += np.minimum(down, samples - down) ** 2
+
+    def nearest(b: int) -> int:
+        late = i * b % samples
+        return int((across + np.minimum(late, samples - late) ** 2).min(initial=samples**2))
+
+    coprime = [b for b in range(1, samples + 1) if np.gcd(b, samples) == 1]
+    return max(coprime, key=lambda b: (nearest(b), -b))
 
 
 def best_step(samples: int) -> int:

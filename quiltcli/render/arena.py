@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from quiltcli.render.shared import SharedArrays
 from quiltcli.scene import Materials, Scene
+from quiltcli.scene.materials import without_pictures
 from quiltcli.scene.scene import corner_normals_of, facing_anywhere, planes_of
 from quiltcli.visibility.draw import BlockPairs
 from quiltcli.visibility.shares import Seen
@@ -90,7 +91,7 @@ def share_scene(arrays: SharedArrays, old: Scene, new: Scene) -> tuple[dict[str,
             arrays.put(f"scene.{field.name}", value)
             shared.append(f"scene.{field.name}")
         elif isinstance(value, Materials):
-            plain[field.name] = replace(value, textures=())  # pictures are in the scene's textures by now
+            plain[field.name] = without_pictures(value)  # these are in the scene's textures by now
         else:
             plain[field.name] = value
     count = len(new.triangles)

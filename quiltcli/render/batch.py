@@ -6,11 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray
-from quiltcli.render.antialiasing import averaged, draw_samples
+from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.projection.gaze import Gaze
+from quiltcli.render.antialiasing import draw_samples, new_batch_sums
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
+from quiltcli.render.sums import summed
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
+from quiltcli.shading.layers import layers
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
 
@@ -29,7 +32,13 @@ class Drawn:
 
 
 def draw_batch(
-    stage: Stage, frame: Frame, batch: tuple[int, int], buffers: Buffers, stale: BoolArray
+    stage: Stage,
+    frame: Frame,
+    batch: tuple[int, int],
+    buffers: Buffers,
+    stale: BoolArray,
+    *,
+    exposed: bool = False,
 ) -> Drawn:
     """Draw one batch into the buffers; its pixels belong to no other batch.
 
@@ -40,31 +49,66 @@ def draw_batch(
         buffers: written to.
         stale: (m,) microtiles of these blocks that still hold another frame and have to be emptied where
             nothing is seen.
+        exposed: whether what is made of samples is left to exposures, which are drawn by themselves.
     """
     frame = ordered(stage, frame)
     block = np.arange(*batch)
-    lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers)
+    lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers, frame.rays)
     channels = stage.job.output.channels
-    light = averaged(channels) if stage.job.render.samples > 1 else ()
+    light = summed(channels) if exposed or stage.job.render.samples > 1 else ()
     if light:
-        draw_samples(stage, frame, batch, buffers, light)
+        if not exposed:
+            draw_samples(stage, frame, batch, buffers, light)
         channels = tuple(name for name in channels if name not in light)
     wanted = wanted_for(channels, stage.scene)
     if frame.order is not None:
         wanted |= Wanted.POSITION
     visible, first = 0, stage.blocks.tiles(batch).start
-    drawing = draw(frame, batch)
+    drawing, gaze = draw(frame, batch), Gaze(frame.viewer, frame.rays)
     for shaded in shaded_for(channels, drawing, wanted, stage.scene, frame.viewer.eye):
-        fill(buffers, channels, frame.viewer, shaded)
+        fill(buffers, channels, gaze, shaded)
         if frame.order is not None:
             fill_stored(buffers, frame.order, shaded.hits)
         visible += shaded.hits.inside
     if stale.any():
         empty_missed(stage, drawing, stale, first, buffers)
+    if drawing.soft is not None:
+        visible += draw_layers(stage, drawing, batch, buffers, channels, wanted, gaze, frame.order)
     tiles = np.full(stale.size, not mends_itself(stage))
     tiles[drawing.drawn() - first] = True
     drawing.done()
     return Drawn(visible, tiles)
+
+
+def draw_layers(
+    stage: Stage,
+    drawing: Drawing,
+    batch: tuple[int, int],
+    buffers: Buffers,
+    channels: tuple[str, ...],
+    wanted: Wanted,
+    gaze: Gaze,
+    order: DepthOrder | None,
+) -> int:
+    """Write `channels` at the pixels that are seen through something; how many inside facets show the scene.
+
+    Light goes through all layers; other channels are those of the first that holds up any.
+    """
+    light = summed(channels)
+    data = tuple(name for name in channels if name not in light)
+    sums, visible = new_batch_sums(stage, batch, light), 0
+    for layer in layers(drawing, wanted, stage.scene, gaze.viewer.eye):
+        if light:
+            sums.add(layer.shaded, layer.weight)
+        if layer.first.any():
+            visible += int(np.count_nonzero(layer.first & layer.inside))
+            mine = np.flatnonzero(layer.first)
+            fill(buffers, data, gaze, layer.shaded, mine)
+            if order is not None:
+                fill_stored(buffers, order, layer.shaded.hits, mine)
+    if light:
+        sums.store(buffers, 1, stage.scene.background)
+    return visible
 
 
 def empty_missed(stage: Stage, drawing: Drawing, stale: BoolArray, first: int, buffers: Buffers) -> None:
@@ -85,11 +129,11 @@ def ordered(stage: Stage, frame: Frame) -> Frame:
     )
 
 
-def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits) -> None:
+def fill_stored(buffers: Buffers, order: DepthOrder, hits: Hits, some: IntArray | None = None) -> None:
     """Write into `zv` what the depth buffer holds, and into `Z` the depth that it is taken for."""
     wanted = [name for name in ("zv", "Z") if name in buffers]
     if wanted:
         assert hits.position is not None
         stored = dict(zip(("zv", "Z"), order.stored(hits.facet, hits.position), strict=True))
         for name in wanted:
-            hits.put(buffers[name], stored[name])
+            hits.put(buffers[name], stored[name], some)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from quiltcli.channels import empty_buffers, exr_channels
 from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.projection.planar import QuiltRays
 from quiltcli.render.setup import Stage
 from quiltcli.visibility.draw import Frame, block_window
 
@@ -51,17 +52,26 @@ def mends_itself(stage: Stage) -> bool:
 
     Not with a background, which lies under everything, nor with several samples a pixel, which see more.
     """
-    return not has_background(stage) and stage.job.render.samples == 1
+    return not has_background(stage) and not stage.job.render.averages
 
 
-def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers) -> None:
-    """Give the pixels of these blocks that their facets own the background's colour, if there is one."""
+def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers, rays: QuiltRays) -> None:
+    """Give the pixels of these blocks that their facets own the background's colour, if there is one.
+
+    Of curved facets only the pixels that show an image to the eye.
+    """
     if not has_background(stage):
         return
     for block in blocks.tolist():
         owner = block_window(stage.owners, stage.blocks, block)
         facet = int(stage.blocks.facet[block]) + 1
         mine = (owner == facet) | (owner == -facet)
+        view = rays.views[facet - 1] if rays.views else None
+        if view is not None:
+            height, width = mine.shape
+            x, y = (float(first[block]) + 0.5 for first in (stage.blocks.x0, stage.blocks.y0))
+            mine[:, : stage.blocks.margin[block]] = False
+            mine &= view.lit(x + np.arange(width), y + np.arange(height)[:, None])
         for name, value in zip("RGB", stage.scene.background, strict=True):
             pixels = block_window(buffers[name], stage.blocks, block)
             # The brightest that half floats hold is bright enough for a background.

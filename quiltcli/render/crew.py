@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import pairwise
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
 
 from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.projection.planar import QuiltRays
-from quiltcli.render.batch import Drawn, draw_batch
+from quiltcli.render.antialiasing import add_samples
+from quiltcli.render.batch import Drawn, draw_batch, ordered
 from quiltcli.render.buffers import Buffers, clear_blocks
 from quiltcli.render.setup import Stage
+from quiltcli.render.sums import Sums, new_sums, summed
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import Binned, BinPlan, bin_frame, bin_plan
@@ -35,9 +41,24 @@ class Crew(Protocol):
         """Empty the pixels of blocks."""
 
     def draw(
-        self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
+        self,
+        frame: Frame,
+        work: Sequence[tuple[int, int]],
+        buffers: Buffers,
+        stale: BoolArray,
+        *,
+        exposed: bool = False,
     ) -> list[Drawn]:
         """Draw batches, as `draw_batch`; `stale` are microtiles (M,) of all blocks."""
+
+    def expose(self, frame: Frame, work: Sequence[tuple[int, int]], places: Places) -> None:
+        """Add samples of batches to the sums of the exposure under way."""
+
+    def develop(self, buffers: Buffers) -> None:
+        """Write the exposure into buffers; the next begins."""
+
+
+Places: TypeAlias = Sequence[tuple[float, float]]
 
 
 @dataclass
@@ -46,6 +67,7 @@ class Threads:
 
     stage: Stage
     workers: int
+    _sums: list[Sums] = field(default_factory=list)
 
     def begin(self, stage: Stage) -> None:
         """Turn to a stage that differs in its scene alone."""
@@ -60,17 +82,58 @@ class Threads:
         clear_blocks(self.stage, blocks, buffers)
 
     def draw(
-        self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
+        self,
+        frame: Frame,
+        work: Sequence[tuple[int, int]],
+        buffers: Buffers,
+        stale: BoolArray,
+        *,
+        exposed: bool = False,
     ) -> list[Drawn]:
         """Draw batches, each in a thread."""
 
         def drawn(batch: tuple[int, int]) -> Drawn:
-            return draw_batch(self.stage, frame, batch, buffers, stale[self.stage.blocks.tiles(batch)])
+            tiles = self.stage.blocks.tiles(batch)
+            return draw_batch(self.stage, frame, batch, buffers, stale[tiles], exposed=exposed)
 
+        return self._all(drawn, work)
+
+    def expose(self, frame: Frame, work: Sequence[tuple[int, int]], places: Places) -> None:
+        """Add samples of batches to the sums of the exposure under way."""
+        if not self._sums and (channels := summed(self.stage.job.output.channels)):
+            size = self.stage.owners.size
+            self._sums.append(Sums(new_sums(channels, lambda dtype: np.zeros(size, dtype)), channels))
+        ready = ordered(self.stage, frame)
+        for sums in self._sums:
+            self._all(partial(_expose, self.stage, ready, sums, places), work)
+
+    def develop(self, buffers: Buffers) -> None:
+        """Write the exposure into buffers; the next begins."""
+        for sums in self._sums:
+            parts = shares_of(sums.size, self.workers)
+            self._all(partial(develop, self.stage, sums, buffers), parts)
+
+    def _all(self, work: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
         if self.workers == 1:
-            return list(map(drawn, work))
+            return list(map(work, items))
         with ThreadPoolExecutor(self.workers) as pool:
-            return list(pool.map(drawn, work))
+            return list(pool.map(work, items))
+
+
+def _expose(stage: Stage, frame: Frame, sums: Sums, places: Places, batch: tuple[int, int]) -> None:
+    add_samples(stage, frame, batch, sums, places)
+
+
+def develop(stage: Stage, sums: Sums, buffers: Buffers, part: slice) -> None:
+    """Write some of an exposure's pixels into buffers, and make their sums 0."""
+    sums.store(buffers, stage.job.render.samples, stage.scene.background, part)
+    sums.clear(part)
+
+
+def shares_of(count: int, parts: int) -> list[slice]:
+    """Ranges of `count` things, so many parts of about the same size."""
+    ends = np.linspace(0, count, parts + 1).astype(np.int64).tolist()
+    return [slice(first, last) for first, last in pairwise(ends)]
 
 
 def plan_of(stage: Stage, viewer: Viewer, rays: QuiltRays) -> BinPlan:
@@ -84,6 +147,7 @@ def plan_of(stage: Stage, viewer: Viewer, rays: QuiltRays) -> BinPlan:
         rays,
         culling=how.backface_culling,
         reach=0.5 if how.samples > 1 else 0.0,
+        one_sided=how.double_sided == "file",
     )
 
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from quiltcli.channels import exr_channels
-from quiltcli.errors import JobError
+from quiltcli.display import Facets
+from quiltcli.errors import JobError, Problem
 from quiltcli.formats.capacity import bytes_text, free_disk, free_memory
 from quiltcli.job import JobFile
 from quiltcli.job.names import Slot, read_template
@@ -93,3 +94,23 @@ def disk_warnings(job: JobFile, layout: Layout, frames: Sequence[int] | None = N
             f"the images of {count:,} view{'s' * (count > 1)} hold {bytes_text(needed)} before compression,"
             f" and {bytes_text(free)} are free in {job.output.directory}"
         )
+
+
+def method_problems(job: JobFile, facets: Facets) -> list[Problem]:
+    """What a job asks for that curved facets do not have: methods that project onto planes."""
+    how, source = job.render, job.render.source
+    standing = [chart is not None and chart.stands for chart in facets.charts]
+    if how.method == "tessellate" and not (standing and all(standing)):
+        return [source.problem("method", "tessellate is for displays of curved surfaces and nothing else")]
+    if not facets.charts:
+        return []
+    if how.method not in ("homography", "raycast", "cubemap", "tessellate"):
+        words = f"{how.method} projects onto flat facets, and the display has curved ones"
+        return [source.problem("method", f"{words} (expected homography, raycast, cubemap or tessellate)")]
+    if how.depth_bits is not None:
+        words = "a depth buffer of so many bits belongs to flat facets, and the display has curved ones"
+        return [source.problem("depth_bits", f"{words} (expected no such key)")]
+    if "motion" in job.output.channels:
+        words = "motion is told on flat facets alone, and the display has curved ones"
+        return [job.output.source.problem("channels", words)]
+    return []

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 from quiltcli.display import Facets
 from quiltcli.display.notices import display_notices
 from quiltcli.geometry import BoolArray
-from quiltcli.job import JobFile
+from quiltcli.job import JobFile, PackSpec
 from quiltcli.job.frames import format_frames
 from quiltcli.layout import Layout
+from quiltcli.projection.camera import WIDEST, beyond_frustum
 from quiltcli.render.needs import disk_warnings, number_warnings, page_warnings
 from quiltcli.render.setup import Stage
-from quiltcli.viewer.clip import behind_words
+from quiltcli.viewer.clip import behind_words, their_lit_facets
 from quiltcli.viewer.edge_on import edge_on_notices
+from quiltcli.viewer.recorded.head import take_notices
 from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import has_embree
@@ -41,10 +44,14 @@ def job_warnings(
 ) -> Iterator[str]:
     """The same of a job of which nothing is set up yet but its display and its layout."""
     yield from display_notices(facets)
-    if job.render.bleed > layout.padding:
+    placed = layout.page[layout.page >= 0].tolist()
+    if job.render.bleed > layout.padding and len(set(placed)) < len(placed):
+        bleed, padding = job.render.bleed, layout.padding
+        wider = f"set layout.padding to {bleed}" if isinstance(job.layout, PackSpec) else ""
+        wider = f"pack it with --padding {bleed}" if isinstance(job.layout, Path) else wider
         yield (
-            f"the bleed of {job.render.bleed} pixels is wider than the layout's padding of"
-            f" {layout.padding}: neighbours share what lies between them"
+            f"the bleed of {bleed} pixels is wider than the layout's padding of {padding}: neighbours share"
+            f" what lies between them ({f'{wider}, or ' * bool(wider)}set render.bleed to {padding})"
         )
     viewers = viewers_of(job, job.frames[:1])
     if job.render.depth == "planar" and not all(viewer.aimed for viewer in viewers):
@@ -52,7 +59,12 @@ def job_warnings(
             "the path does not say where the head looks, on which no picture for one eye depends; depth is"
             " measured along the line to the display's middle (render.depth: radial measures the distance)"
         )
+    if job.render.method == "twopass":
+        yield from _narrow_pictures(facets, viewers_of(job, job.frames if frames is None else frames))
     yield from edge_on_notices(facets, viewers_of(job, job.frames if frames is None else frames))
+    for spec in job.people.values():
+        if spec.path.recorded is not None:
+            yield from take_notices(spec.path.recorded)
     others = sorted(set(frames or ()) - set(job.frames))
     if others:
         known = format_frames(job.frames)
@@ -63,3 +75,15 @@ def job_warnings(
     yield from disk_warnings(job, layout, frames)
     if not has_embree():
         yield "embreex is not installed: triangles are sorted to facets without it, which takes longer"
+
+
+def _narrow_pictures(facets: Facets, viewers: Iterable[Viewer]) -> Iterator[str]:
+    """Frames in which the picture of a render in two passes does not hold all lit facets."""
+    frames = [v.frame for v in viewers if beyond_frustum(v, facets, their_lit_facets(facets, v))]
+    if frames:
+        which = format_frames(sorted(set(frames)))
+        yield (
+            f"render.method twopass draws {WIDEST:.0f} degrees about the look direction: in frames"
+            f" {which} lit facets reach beyond, and their pixels there stay empty (every other method draws"
+            " all around)"
+        )

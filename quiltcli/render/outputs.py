@@ -15,11 +15,12 @@ from quiltcli.display import lit_facets
 from quiltcli.errors import OutputError, Problem, raise_all
 from quiltcli.formats.exr.digest import is_sealed
 from quiltcli.formats.exr.header import plausible_frame
-from quiltcli.formats.exr.image import Channel, Image, read_exr, read_header, write_images
+from quiltcli.formats.exr.image import Channel, Image, read_header, write_images
 from quiltcli.formats.whole import link_whole, make_folder, remove_file, sync_folder, write_text
 from quiltcli.geometry import BoolArray, IntArray, facet_from_world
 from quiltcli.images.facets import facet_image, page_of
-from quiltcli.images.metadata import facet_attributes, page_attributes, viewer_attributes
+from quiltcli.images.layers import channel_parts, read_view
+from quiltcli.images.metadata import facet_attributes, page_attributes, surface_attributes, viewer_attributes
 from quiltcli.images.names import layout_path
 from quiltcli.images.window import cropped, frame_size, tight_window, whole_frame
 from quiltcli.job import PackSpec, dump_job
@@ -122,10 +123,17 @@ def write_settings(stage: Stage, out: Outputs) -> None:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A view and its pixels."""
+    """A view and its pixels.
+
+    Attributes:
+        view: the view.
+        buffers: its pixels.
+        mattes: attributes that say what its mattes are of.
+    """
 
     view: View
     buffers: Buffers
+    mattes: Attributes = field(default_factory=dict)
 
 
 def write_views(stage: Stage, out: Outputs, drawn: Sequence[Drawn], threads: int) -> dict[str, float]:
@@ -157,7 +165,7 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
         for page in range(len(layout.pages)):
             path = page_file(stage, out, page, view)
             also = {"quilt:page": page + 1} | out.besides
-            own = [page_attributes(one.view, *told) | also for one in drawn]
+            own = [page_attributes(one.view, *told) | also | one.mattes for one in drawn]
             yield _write_page, stage, path, page, drawn, own
     if not how.facets:
         return
@@ -166,8 +174,11 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
     apart = ~lit[out.rows] & (how.unlit != "write")
     for row in out.rows[~apart].tolist():
         facet = int(layout.facet[row])
+        chart = stage.facets.charts[row] if stage.facets.charts else None
         where = facet_attributes(facet, maps[row]) | out.besides
-        own = [viewer_attributes(one.view, facet, *told) | where for one in drawn]
+        if chart is not None:
+            where = surface_attributes(facet, chart.record) | out.besides
+        own = [viewer_attributes(one.view, facet, *told) | where | one.mattes for one in drawn]
         path = facet_file(stage, out, row, view)
         yield _write_facet, stage, path, row, drawn, own
     if apart.any():
@@ -176,7 +187,7 @@ def _work(stage: Stage, out: Outputs, drawn: Sequence[Drawn]) -> Iterator[tuple[
             if how.unlit == "skip":
                 yield _remove, paths
             else:
-                own = [page_attributes(one.view, *told) | out.besides for one in drawn]
+                own = [page_attributes(one.view, *told) | out.besides | one.mattes for one in drawn]
                 yield _write_links, stage, rows[0], drawn, own, paths
 
 
@@ -243,7 +254,7 @@ def _write(
 ) -> None:
     """Write one image, or one for each view, as the job wants it."""
     how = stage.job.output
-    images = []
+    images: list[Image] = []
     for one, channels, own in zip(drawn, pixels, attributes, strict=True):
         height, width = next(iter(channels.values())).shape
         frame = window = (0, 0), (width - 1, height - 1)
@@ -254,7 +265,8 @@ def _write(
                 if plausible_frame((width, height), (x1 - x0 + 1, y1 - y0 + 1)):
                     window = (x0, y0), (x1, y1)
                     channels = cropped(channels, window)
-        images.append(Image(channels, own, how.compression, window, frame, one.view.part))
+        image = Image(channels, own, how.compression, window, frame, one.view.part)
+        images += channel_parts(image, how.channels) if how.parts == "parts" else [image]
     with clock.stage("compress and store"):
         write_images(path, images)
 
@@ -273,7 +285,7 @@ def read_quilt(stage: Stage, out: Outputs, view: View, buffers: Buffers) -> None
     raise_all(OutputError, merge_problems(stage, out, [view]))
     for page in range(len(stage.layout.pages)):
         path = page_file(stage, out, page, view)
-        image = read_exr(path, view.part)
+        image = read_view(path, view.part)
         if missing := sorted(set(buffers) - set(image.channels)):
             raise OutputError(Problem(f"lacks the channels {', '.join(missing)}", str(path)))
         channels = whole_frame(image)

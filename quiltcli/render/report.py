@@ -56,6 +56,8 @@ class FrameRecord:
         write_seconds: time in the writer's threads, all together, by what they did.
         warnings: sentences for the user.
         eye: `left` or `right`, empty where there is one eye.
+        binned: whether the method sorts triangles to the display's facets; otherwise the figures of that
+            mean nothing.
     """
 
     frame: int
@@ -71,6 +73,7 @@ class FrameRecord:
     write_seconds: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     eye: str = ""
+    binned: bool = True
 
     @property
     def settled_share(self) -> float:
@@ -108,8 +111,17 @@ class FrameRecord:
         warnings = entry.pop("warnings")
         times = {name: entry.pop(name) for name in ("wall_seconds", "seconds", "write_seconds")}
         eye = {"eye": eye} if (eye := entry.pop("eye")) else {}
+        binned = {"binned": entry.pop("binned")}
         shares = {"settled_share": self.settled_share, "replication": self.replication}
-        return {"frame": entry.pop("frame")} | eye | entry | shares | times | {"warnings": list(warnings)}
+        return (
+            {"frame": entry.pop("frame")}
+            | eye
+            | entry
+            | binned
+            | shares
+            | times
+            | {"warnings": list(warnings)}
+        )
 
 
 def together(records: Sequence[FrameRecord]) -> FrameRecord:
@@ -203,10 +215,10 @@ def summary(records: Sequence[FrameRecord]) -> list[tuple[str, str]]:
     for stage, seconds in _summed(record.seconds for record in records).items():
         lines.append((f"  {stage}", f"{seconds:.2f} s{words.get(stage, '')}"))
     lines.append(("triangles", _range_text([record.triangles for record in records], "{:,}")))
-    lines.append(
-        ("settled in pass 1", _range_text([100 * record.settled_share for record in records], "{:.1f} %"))
-    )
-    lines.append(("replication", _range_text([record.replication for record in records], "{:.3f}")))
+    if binned := [record for record in records if record.binned and record.reaching]:
+        settled = [100 * record.settled_share for record in binned]
+        lines.append(("settled in pass 1", _range_text(settled, "{:.1f} %")))
+        lines.append(("replication", _range_text([record.replication for record in binned], "{:.3f}")))
     lines.append(("lit facets", _range_text([record.lit_facets for record in records], "{:,}")))
     lines.append(("pixels that show it", _range_text([record.visible_pixels for record in records], "{:,}")))
     lines.append(("fill", _range_text([100 * record.fill for record in records], "{:.1f} %")))

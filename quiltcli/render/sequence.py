@@ -29,7 +29,8 @@ from quiltcli.job import JobFile, job_sha256
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.interrupt import stop_between_frames
-from quiltcli.render.methods import draw_view
+from quiltcli.render.methods import draw_moment
+from quiltcli.render.moments import moment
 from quiltcli.render.notices import stage_warnings
 from quiltcli.render.outputs import (
     Drawn,
@@ -44,7 +45,9 @@ from quiltcli.render.outputs import (
 from quiltcli.render.report import FrameRecord, write_report
 from quiltcli.render.resume import clear_away, unfinished
 from quiltcli.render.setup import Stage, set_stage
+from quiltcli.render.unseen import unseen_in
 from quiltcli.render.workers import Pool, can_fork, shared_buffers, worth_forking
+from quiltcli.shading.mattes import matte_attributes
 from quiltcli.viewer.view import View, by_file, views_of
 
 _OF_THE_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EIO}
@@ -132,6 +135,8 @@ def render(
     ready = prepare(job, options)
     say_notices(ready, options, listener)
     if options.dry_run:
+        for notice in unseen_in(ready.stage, ready.views):
+            listener.say(notice)
         return []
     clear_away(ready.stage, ready.out)
     if not ready.views:
@@ -202,13 +207,14 @@ def render_frames(
             # One file is written while the next is drawn, unless it takes all the sheets there are.
             writer.leave(len(sheets) // most - 1)
             turns = [(number * most + place) % len(sheets) for place in range(len(group))]
-            records = []
+            records, drawn = [], []
             for turn, view in zip(turns, group, strict=True):
                 if ready.only is not None:
                     read_quilt(stage, ready.out, view, sheets[turn])
-                now, sheet = stage.at(view.time), sheets[turn]
-                records.append(draw_view(now, view, sheet, threads, ready.only, dirty=dirty[turn], crew=pool))
-            writer.take(records, [Drawn(view, sheets[turn]) for turn, view in zip(turns, group, strict=True)])
+                now, sheet = moment(stage, view), sheets[turn]
+                records.append(draw_moment(now, sheet, threads, ready.only, dirty=dirty[turn], crew=pool))
+                drawn.append(Drawn(view, sheet, matte_attributes(now.stage.scene, stage.job.output.channels)))
+            writer.take(records, drawn)
         writer.leave(0)
         request.check()
     return writer.records

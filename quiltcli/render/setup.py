@@ -10,21 +10,26 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.display import Facets, load_display, scaled
-from quiltcli.errors import JobError, SceneError, raise_all
-from quiltcli.geometry import OwnerArray
+from quiltcli.errors import JobError, Problem, SceneError, raise_all
+from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.images.names import Names, layout_path, names_of, names_problems
-from quiltcli.job import JobFile, PackSpec, UvLayoutSpec, load_display_file, load_scene_file
+from quiltcli.job import JobFile, PackSpec, SceneFile, UvLayoutSpec, load_display_file, load_scene_file
 from quiltcli.layout import Layout, pixel_owners
 from quiltcli.layout.from_job import layout_for
-from quiltcli.render.needs import demand_memory
+from quiltcli.projection.patches import Patches, patched
+from quiltcli.projection.planar import QuiltRays, viewer_rays
+from quiltcli.render.needs import demand_memory, method_problems
 from quiltcli.scene import Scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
 from quiltcli.scene.textures.pool import TextureLimits, TextureStore
+from quiltcli.shading.lights import demand_shadows
 from quiltcli.viewer.clip import settled_clip
 from quiltcli.viewer.view import View, facet_problems, views_of
+from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.binning.pairs import Parts, facet_parts
 from quiltcli.visibility.draw import Blocks, cut_blocks
+from quiltcli.visibility.setup.patches import with_patches
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,7 @@ class Stage:
         owners: (pixels,) facet id of every quilt pixel, negative in its bleed, 0 for none.
         fill: share of the quilt's pixels that lie in facets.
         source: gives the scene of each frame; None where nothing moves.
+        patches: of curved facets, the last of the blocks; None where all are flat.
     """
 
     job: JobFile
@@ -52,6 +58,7 @@ class Stage:
     owners: OwnerArray
     fill: float
     source: SceneSource | None = None
+    patches: Patches | None = None
 
     @cached_property
     def clip(self) -> str:
@@ -74,6 +81,11 @@ class Stage:
         raise_all(SceneError, self.source.problems(frames) if self.source else ())
         return views_of(self.job, frames, self.clip)
 
+    def rays(self, lit: BoolArray, viewer: Viewer) -> QuiltRays:
+        """Rays of a viewer's eye through the facets that are `lit` (F,), curved ones in patches."""
+        rays = viewer_rays(self.layout, self.facets, lit, viewer)
+        return rays if self.patches is None else patched(rays, self.patches)
+
     def at(self, frame: float) -> Stage:
         """The stage with its scene as it is in a frame; itself where nothing moves."""
         scene = self.source.scene_at(frame) if self.source else self.scene
@@ -88,17 +100,31 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
         folder: output folder instead of the job's; the layout of an earlier run is kept there.
 
     Raises:
-        QuiltError: a file is wrong, or the layout does not belong to the display.
+        QuiltError: a file is wrong, the layout does not belong to the display, or there is no Embree for
+            shadows.
     """
     kept = layout_path(folder or job.output.directory)
     facets, choice = facets_and_layout(job)
-    raise_all(JobError, facet_problems(job, facets.count))
+    raise_all(JobError, facet_problems(job, facets.count) + method_problems(job, facets))
     layout = layout_for(choice, facets, kept)
     raise_all(JobError, names_problems(job, len(layout.pages), facets.count))
     demand_memory(job, layout)
     store = TextureStore(texture_limits(job))
-    scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps), store)
+    scene, source = load_moving_scene(scene_spec(job), float(job.fps), store)
+    if facets.charts and scene.soft is not None:
+        words = "has surfaces that light passes, which curved facets do not show yet (expected opaque ones)"
+        raise SceneError(Problem(words, file=str(job.scene)))
+    demand_shadows(scene)
     return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)
+
+
+def scene_spec(job: JobFile) -> SceneFile:
+    """The scene file of a job, as the job wants it drawn."""
+    spec = load_scene_file(job.scene)
+    near = job.render.ambient_occlusion
+    if not job.render.shadows:
+        spec = spec.without_shadows()
+    return spec if near is None else spec.with_ambient_occlusion(near.distance, near.samples)
 
 
 def texture_limits(job: JobFile) -> TextureLimits:
@@ -119,13 +145,22 @@ def facets_and_layout(job: JobFile) -> tuple[Facets, Path | PackSpec | UvLayoutS
 def stage_of(job: JobFile, facets: Facets, layout: Layout, scene: Scene, bleed: int) -> Stage:
     """The stage of a display, its layout and a scene that are already there."""
     owners = pixel_owners(layout, bleed)
+    # What is curved has no part and no block of flat facets.
+    flat = (
+        replace(layout, page=np.where(facets.curved, np.int32(-1), layout.page)) if facets.charts else layout
+    )
+    blocks, patches = cut_blocks(flat, bleed, owners), None
+    if facets.charts:
+        beside = 0.5 if job.render.samples > 1 else 0.0
+        blocks, patches = with_patches(blocks, layout, facets.charts, bleed, owners, beside)
     return Stage(
         job=job,
         facets=facets,
         layout=layout,
         scene=scene,
-        parts=facet_parts(facets, layout, bleed),
-        blocks=cut_blocks(layout, bleed, owners),
+        parts=facet_parts(facets, flat, bleed),
+        blocks=blocks,
         owners=owners,
         fill=np.count_nonzero(owners > 0) / owners.size,
+        patches=patches,
     )

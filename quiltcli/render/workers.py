@@ -21,7 +21,6 @@ import sys
 import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from multiprocessing.connection import wait
 from multiprocessing.util import Finalize
 from operator import itemgetter
@@ -43,11 +42,13 @@ from quiltcli.render.arena import (
 )
 from quiltcli.render.batch import Drawn
 from quiltcli.render.buffers import Buffers
-from quiltcli.render.crew import Threads, plan_of
+from quiltcli.render.crew import Places, Threads, plan_of, shares_of
 from quiltcli.render.setup import Stage
 from quiltcli.render.shared import SharedArrays
+from quiltcli.render.sums import Sums, new_sums, summed
 from quiltcli.render.workplace import Fault, Item, Moved, Task, Workplace, serve
 from quiltcli.scene.textures.tangents import tangents_of
+from quiltcli.shading.lights import prepare_shadows
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import (
@@ -143,12 +144,14 @@ class Pool:
         self._arrays = SharedArrays()
         self._shares_of_triangles = _SHARES * workers
         self._arena = self._new_arena(stage)
+        self._sums = _shared_sums(stage)
         self._frame = 0
         # Made once, before there are copies of the process.
         _ = stage.scene.planes, stage.scene.corner_normals, stage.scene.corner_colors
         tangents_of(stage.scene)
         if stage.job.render.backface_culling:
             _ = stage.scene.facing
+        prepare_shadows(stage.scene)
         self._workers: list[_Worker] = []
         self._known: list[set[int]] = [set() for _ in range(workers)]
         # Python waits at its end for children that are left, and these are deaf to its signal to end.
@@ -157,7 +160,7 @@ class Pool:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         try:
             for _number in range(workers):
-                self._workers.append(_forked(Workplace(stage, buffers, self._arena)))
+                self._workers.append(_forked(Workplace(stage, buffers, self._arena, self._sums)))
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         except BaseException:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -222,26 +225,43 @@ class Pool:
         self._share_out(Item("clear", (part, index)) for part in parts)
 
     def draw(
-        self, frame: Frame, work: Sequence[tuple[int, int]], buffers: Buffers, stale: BoolArray
+        self,
+        frame: Frame,
+        work: Sequence[tuple[int, int]],
+        buffers: Buffers,
+        stale: BoolArray,
+        *,
+        exposed: bool = False,
     ) -> list[Drawn]:
         """Draw batches into one of the pool's buffers, as `batch.draw_batch`."""
-        pairs = frame.pairs
-        if pairs.memory is not self._arena.pairs.memory:
-            return Threads(self._stage, self.workers).draw(frame, work, buffers, stale)
-        index = self._index(buffers)
-        cost = [int(pairs.per_block[first:last].sum()) for first, last in work]
-        dearest = np.argsort(cost, kind="stable")[::-1].tolist()
-        tiles = self._stage.blocks.tiles
-        done = self._share_out(Item("draw", (work[i], index, stale[tiles(work[i])])) for i in dearest)
+        if frame.pairs.memory is not self._arena.pairs.memory:
+            return Threads(self._stage, self.workers).draw(frame, work, buffers, stale, exposed=exposed)
+        index, tiles = self._index(buffers), self._stage.blocks.tiles
+        dearest = _dearest_first(frame, work)
+        items = (Item("draw", (work[i], index, stale[tiles(work[i])], exposed)) for i in dearest)
+        done = self._share_out(items)
         return [one for _, one in sorted(zip(dearest, done, strict=True), key=itemgetter(0))]
+
+    def expose(self, frame: Frame, work: Sequence[tuple[int, int]], places: Places) -> None:
+        """Add samples of batches to the sums of the exposure under way."""
+        if frame.pairs.memory is not self._arena.pairs.memory:
+            Threads(self._stage, self.workers, self._sums).expose(frame, work, places)
+            return
+        self._share_out(Item("expose", (work[i], places)) for i in _dearest_first(frame, work))
+
+    def develop(self, buffers: Buffers) -> None:
+        """Write the exposure into one of the pool's buffers; the next begins."""
+        index = self._index(buffers)
+        for sums in self._sums:
+            parts = shares_of(sums.size, _SHARES * self.workers)
+            self._share_out(Item("develop", (index, part)) for part in parts)
 
     def _index(self, buffers: Buffers) -> int:
         return next(i for i, known in enumerate(self._buffers) if known is buffers)
 
     def _shares(self, count: int) -> list[slice]:
         """Ranges of `count` things to be handed out."""
-        ends = np.linspace(0, count, _SHARES * self.workers + 1).astype(np.int64).tolist()
-        return [slice(first, last) for first, last in pairwise(ends)]
+        return shares_of(count, _SHARES * self.workers)
 
     def _share_out(self, items: Iterable[Item]) -> list[Any]:
         """Hand out work as workers become free; the answers in the order of the items."""
@@ -262,6 +282,21 @@ class Pool:
                 answers[number] = worker.hear(self._frame)
                 hand_out(worker)
         return answers
+
+
+def _shared_sums(stage: Stage) -> list[Sums]:
+    """Sums of exposures in memory that workers share, if there are exposures."""
+    channels, size = summed(stage.job.output.channels), stage.owners.size
+    if not stage.job.render.shutter or not channels:
+        return []
+    return [Sums(new_sums(channels, lambda dtype: shared_array(size, dtype)), channels)]
+
+
+def _dearest_first(frame: Frame, work: Sequence[tuple[int, int]]) -> list[int]:
+    """The batches by their numbers, those of most pairs first."""
+    cost = [int(frame.pairs.per_block[first:last].sum()) for first, last in work]
+    order: list[int] = np.argsort(cost, kind="stable")[::-1].tolist()
+    return order
 
 
 def _forked(place: Workplace) -> _Worker:

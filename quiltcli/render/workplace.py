@@ -16,18 +16,19 @@ from numpy.typing import NDArray
 
 from quiltcli.ending import SIGNALS
 from quiltcli.geometry import BoolArray
-from quiltcli.projection.planar import quilt_rays
+from quiltcli.render.antialiasing import add_samples
 from quiltcli.render.arena import (
     Arena,
     arena_of,
     fill_tables,
     moved_scene,
 )
-from quiltcli.render.batch import Drawn, draw_batch
+from quiltcli.render.batch import Drawn, draw_batch, ordered
 from quiltcli.render.buffers import Buffers, clear_blocks
-from quiltcli.render.crew import plan_of
+from quiltcli.render.crew import Places, develop, plan_of
 from quiltcli.render.setup import Stage
 from quiltcli.render.shared import AttachedArrays
+from quiltcli.render.sums import Sums
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame, pairs_by_block
 from quiltcli.visibility.shares import (
@@ -72,15 +73,17 @@ class Fault:
 class Workplace:
     """What a worker has at hand; its public methods are the work it can be given."""
 
-    def __init__(self, stage: Stage, buffers: Sequence[Buffers], arena: Arena) -> None:
-        self._stage, self._buffers, self._arena = stage, buffers, arena
+    def __init__(
+        self, stage: Stage, buffers: Sequence[Buffers], arena: Arena, sums: Sequence[Sums] = ()
+    ) -> None:
+        self._stage, self._buffers, self._arena, self._sums = stage, buffers, arena, sums
         self._arrays = AttachedArrays()
         self._plan: BinPlan | None = None
         self._frame: Frame | None = None
 
     def begin(self, task: Task) -> None:
         """Turn to another frame."""
-        rays = quilt_rays(self._stage.layout, task.lit, task.viewer.eye)
+        rays = self._stage.rays(task.lit, task.viewer)
         self._plan, self._frame = plan_of(self._stage, task.viewer, rays), None
 
     def move(self, moved: Moved, connection: Connection) -> None:
@@ -117,14 +120,29 @@ class Workplace:
         """Empty the pixels of some blocks."""
         clear_blocks(self._stage, blocks, self._buffers[index])
 
-    def draw(self, batch: tuple[int, int], index: int, stale: BoolArray) -> Drawn:
+    def draw(self, batch: tuple[int, int], index: int, stale: BoolArray, exposed: bool) -> Drawn:
         """Draw a batch."""
+        return draw_batch(self._stage, self.frame, batch, self._buffers[index], stale, exposed=exposed)
+
+    def expose(self, batch: tuple[int, int], places: Places) -> None:
+        """Add samples of a batch to the exposure under way."""
+        for sums in self._sums:
+            add_samples(self._stage, ordered(self._stage, self.frame), batch, sums, places)
+
+    def develop(self, index: int, part: slice) -> None:
+        """Write some pixels of the exposure."""
+        for sums in self._sums:
+            develop(self._stage, sums, self._buffers[index], part)
+
+    @property
+    def frame(self) -> Frame:
+        """The frame under way, all of which is binned."""
         if self._frame is None:
             seen, plan, stage = self._arena.seen, self.plan, self._stage
             sight = sight_of(stage.scene, seen, culling=plan.culling)
             pairs = self._arena.frame_pairs()
-            self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs)
-        return draw_batch(self._stage, self._frame, batch, self._buffers[index], stale)
+            self._frame = Frame(plan.viewer, sight, plan.rays, stage.blocks, pairs, patches=stage.patches)
+        return self._frame
 
     @property
     def plan(self) -> BinPlan:

@@ -29,6 +29,7 @@ class Baked:
         part: (T,) index of the part each triangle came from.
         infinite: triangles dropped for a vertex that is NaN, infinite or beyond `FARTHEST`.
         empty: triangles dropped for having no area.
+        opacities: (V,) alpha, or None where no part has any.
         uv: (V, 2) texture coordinates, NaN where a part has none, or None where no part has any.
         uv1: (V, 2) those of the second set, likewise.
         source: (V,) the vertex of the joined parts each one is a copy of.
@@ -46,6 +47,7 @@ class Baked:
     source: IntArray
     group: IntArray
     uv: FloatArray | None = None
+    opacities: Float32Array | None = None
     uv1: FloatArray | None = None
 
 
@@ -70,12 +72,13 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
 
     given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
     colors, uv, uv1 = _given_colors(parts), *given_uv(parts)
+    opacities = given_opacities(parts)
     source, triangles, normals, group = _with_normals(
         vertices,
         triangles,
         given,
         180.0 if mode != "auto" else CREASE_DEG,
-        keep_sources=any(values is not None for values in (colors, uv, uv1)),
+        keep_sources=any(values is not None for values in (colors, uv, uv1, opacities)),
     )
     return Baked(
         vertices=vertices[source],
@@ -90,6 +93,7 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
         uv1=None if uv1 is None else uv1[source],
         source=source,
         group=group,
+        opacities=None if opacities is None else opacities[source],
     )
 
 
@@ -150,6 +154,14 @@ def _given_colors(parts: Sequence[Part]) -> Float32Array | None:
     return np.concatenate(
         [np.ones(p.vertices.shape, np.float32) if p.colors is None else p.colors for p in parts]
     )
+
+
+def given_opacities(parts: Sequence[Part] | Sequence[Baked]) -> Float32Array | None:
+    """Alpha (V,) of all, 1 where some have none; None where none has."""
+    if all(part.opacities is None for part in parts):
+        return None
+    given = [np.ones(len(p.vertices), np.float32) if p.opacities is None else p.opacities for p in parts]
+    return np.concatenate(given)
 
 
 def given_uv(parts: Sequence[Part] | Sequence[Baked]) -> tuple[FloatArray | None, FloatArray | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,17 +12,18 @@ import numpy as np
 from quiltcli.errors import Problem, SceneError, counted, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import Float32Array
-from quiltcli.scene.bake import Baked, given_uv
+from quiltcli.scene.bake import Baked, given_opacities, given_uv
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.gltf import FileLight, GltfModel, Playing, contested_channels
-from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point
+from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point, spot
 from quiltcli.scene.materials import Surface, material_table
 from quiltcli.scene.objects import Brought, ObjectError, SceneObject, bring, load_object
 from quiltcli.scene.scene import Scene
 from quiltcli.scene.textures.notices import textures_not_drawn, textures_without_places
 
 if TYPE_CHECKING:
-    from quiltcli.job.scene import LightSpec, ObjectSpec, SceneFile
+    from quiltcli.job.lights import LightSpec
+    from quiltcli.job.scene import ObjectSpec, SceneFile
 
 Color = tuple[float, float, float]
 
@@ -58,6 +59,8 @@ class _Gathered:
     baked: list[Baked] = field(default_factory=list)
     materials: list[list[int]] = field(default_factory=list)
     surfaces: dict[Surface, int] = field(default_factory=dict)
+    named: list[list[int]] = field(default_factory=list)
+    material_names: dict[str, int] = field(default_factory=dict)
     coverage: Coverage = NOTHING
     notices: list[str] = field(default_factory=list)
     lights: list[FileLight] = field(default_factory=list)
@@ -65,18 +68,21 @@ class _Gathered:
 
     def take(self, name: str, brought: Brought, playing: Playing | None) -> None:
         """Append what an object brings."""
-        self.add(name, brought.asset, brought.baked, brought.surfaces)
+        self.add(name, brought)
         self.animate(name, brought.asset.model, playing)
         self.light(name, brought.lights)
 
-    def add(self, name: str, asset: Asset, baked: Baked, surfaces: Sequence[Surface]) -> None:
-        """Append an object; its parts have the given surfaces."""
+    def add(self, name: str, brought: Brought) -> None:
+        """Append an object; a material that has no name has the object's."""
+        asset, baked = brought.asset, brought.baked
         self.names.append(name)
         self.baked.append(baked)
-        self.materials.append([self.surfaces.setdefault(s, len(self.surfaces)) for s in surfaces])
+        self.materials.append([self.surfaces.setdefault(s, len(self.surfaces)) for s in brought.surfaces])
+        called = [material or name for material in brought.materials]
+        self.named.append([self.material_names.setdefault(m, len(self.material_names)) for m in called])
         self.coverage += asset.coverage
-        self.notices += [f"{name}: {words}" for words in textures_not_drawn(surfaces)]
-        self.notices += [f"{name}: {words}" for words in textures_without_places(baked, surfaces)]
+        self.notices += [f"{name}: {words}" for words in textures_not_drawn(brought.surfaces)]
+        self.notices += [f"{name}: {words}" for words in textures_without_places(baked, brought.surfaces)]
         for count, why in ((baked.infinite, "with NaN or infinite vertices"), (baked.empty, "of no area")):
             if count:
                 self.notices.append(f"{name}: {counted(count, 'triangle')} {why} dropped")
@@ -106,12 +112,6 @@ class _Gathered:
             words = f"{counted(len(lights), 'light')} of the file left out ('lights: file' takes them)"
             self.notices.append(f"{name}: {words}")
             return
-        spots = sum(light.kind == "spot" for light in lights)
-        limited = sum(light.limited for light in lights if light.kind != "spot")
-        if spots:
-            self.notices.append(f"{name}: {counted(spots, 'spot light')} of the file left out")
-        if limited:
-            self.notices.append(f"{name}: the range of {counted(limited, 'light')} is not kept to")
         self.lights += lights
 
 
@@ -150,7 +150,8 @@ def scene_of(spec: SceneFile, objects: Sequence[SceneObject], brought: Sequence[
     for index, (one, given) in enumerate(zip(objects, brought, strict=True)):
         gathered.take(one.name, given, one.playing)
         gathered.notices += _bright(index, spec.objects[index])
-    return _assembled(gathered, spec.lights, spec.background)
+    thin = tuple(index for index, item in enumerate(spec.objects) if not item.casts_shadows)
+    return replace(_assembled(gathered, spec.lights, spec.background), lets_light_by=thin)
 
 
 def wants_lights(spec: SceneFile) -> bool:
@@ -173,7 +174,10 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
     baked = gathered.baked
     counts = [len(b.triangles) for b in baked]
     base = np.cumsum([0, *(len(b.vertices) for b in baked)])
-    rows = [np.array(m, dtype=np.int32)[b.part] for m, b in zip(gathered.materials, baked, strict=True)]
+    rows, named = (
+        [np.array(m, dtype=np.int32)[b.part] for m, b in zip(table, baked, strict=True)]
+        for table in (gathered.materials, gathered.named)
+    )
     triangles = [b.triangles + start for b, start in zip(baked, base, strict=False)]
     uv, uv1 = given_uv(baked)
     return Scene(
@@ -191,6 +195,9 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         uv=uv,
         uv1=uv1,
         coverage=gathered.coverage,
+        material_names=tuple(gathered.material_names),
+        material_name=np.concatenate(named),
+        opacities=given_opacities(baked),
         notices=_notices(gathered, lights),
     )
 
@@ -210,7 +217,7 @@ def _notices(gathered: _Gathered, lights: Sequence[LightSpec]) -> tuple[str, ...
 
 def _has_lamps(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> bool:
     """Whether anything lights the scene."""
-    return any(light.type != "file" for light in lights) or any(light.kind != "spot" for light in found)
+    return any(light.type != "file" for light in lights) or bool(found)
 
 
 def lights_in(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> tuple[Light, ...]:
@@ -218,12 +225,18 @@ def lights_in(lights: Sequence[LightSpec], found: Sequence[FileLight]) -> tuple[
     if not _has_lamps(lights, found):
         return default_lights()
     scale = sum(light.scale for light in lights if light.type == "file")
+    shadows = any(light.shadows for light in lights if light.type == "file")
     own = [light for light in lights if light.type != "file"]
     rows = list(lights_of(own)) if own else []
-    for light in found:
-        color = [scale * part for part in light.color]
-        if light.kind == "directional":
-            rows.append(directional(light.direction, color))
-        elif light.kind == "point":
-            rows.append(point(light.position, color))
+    rows += [_lamp(light, scale, shadows=shadows) for light in found]
     return tuple(rows)
+
+
+def _lamp(light: FileLight, scale: float, *, shadows: bool) -> Light:
+    """A light of a mesh file."""
+    color = [scale * part for part in light.color]
+    if light.kind == "directional":
+        return directional(light.direction, color, shadows=shadows)
+    if light.kind == "point":
+        return point(light.position, color, light.reach, shadows=shadows)
+    return spot(light.position, light.direction, color, light.cone, light.reach, shadows=shadows)

@@ -10,7 +10,7 @@ import numpy as np
 
 from quiltcli.geometry import Float32Array
 from quiltcli.job.model import FARTHEST
-from quiltcli.scene.scene import Materials
+from quiltcli.scene.scene import ALPHAS, Materials
 from quiltcli.scene.textures.picture import Picture
 
 if TYPE_CHECKING:
@@ -58,6 +58,10 @@ class Surface:
         unlit: shows exactly `color`.
         specular: 0 to 1, strength of the layer that reflects; metals reflect all the same.
         textures: images that vary it.
+        opacity: alpha, 0 to 1.
+        alpha: what that means: `opaque`, `mask` or `blend`.
+        cutoff: the least alpha that `mask` shows.
+        double_sided: whether its back is seen, too, in jobs that ask the files.
     """
 
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)
@@ -67,6 +71,10 @@ class Surface:
     unlit: bool = False
     specular: float = 1.0
     textures: tuple[Texture, ...] = ()
+    opacity: float = 1.0
+    alpha: str = "opaque"
+    cutoff: float = 0.5
+    double_sided: bool = True
 
     def overridden(self, given: Mapping[str, Any], textures: Sequence[Texture] = ()) -> Surface:
         """This surface with the keys of `given` in place of its own, without images that vary those.
@@ -76,6 +84,8 @@ class Surface:
             textures: pictures that vary it from now on.
         """
         changes: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
+        if "opacity" in changes and "alpha" not in changes and self.alpha == "opaque":
+            changes["alpha"] = "blend"
         gone = {*changes, *(texture.role for texture in textures)}
         kept = tuple(texture for texture in self.textures if texture.role not in gone)
         changes.setdefault("textures", (*kept, *textures))
@@ -112,6 +122,10 @@ def material_table(surfaces: Sequence[Surface]) -> Materials:
         unlit=np.array([s.unlit for s in surfaces], dtype=np.bool_),
         specular=_plausible([s.specular for s in surfaces], 1.0),
         textures=tuple(s.textures for s in surfaces),
+        opacity=_plausible([s.opacity for s in surfaces], 1.0),
+        alpha=np.array([ALPHAS.index(s.alpha) for s in surfaces], dtype=np.int32),
+        cutoff=_plausible([s.cutoff for s in surfaces]),
+        one_sided=np.array([not s.double_sided for s in surfaces], dtype=np.bool_),
     )
 
 
@@ -119,3 +133,12 @@ def _plausible(values: Sequence[Any], most: float = FARTHEST) -> Float32Array:
     """Values of mesh files within what light can be: from 0 to `most`, 0 for what is no number."""
     found = np.nan_to_num(np.array(values, dtype=np.float64), nan=0.0, posinf=most)
     return np.clip(found, 0.0, most).astype(np.float32)
+
+
+def without_pictures(materials: Materials) -> Materials:
+    """The table with textures that do not know their files: what they vary is known all the same."""
+    textures = (
+        tuple(replace(texture, picture=Picture(texture.picture.path)) for texture in own)
+        for own in materials.textures
+    )
+    return replace(materials, textures=tuple(textures))

@@ -39,12 +39,14 @@ class Brought:
         baked: its triangles, in the world.
         surfaces: those of its parts.
         lights: those of its file, in the world.
+        materials: names of its parts' materials, empty where they have none.
     """
 
     asset: Asset
     baked: Baked
     surfaces: tuple[Surface, ...]
     lights: tuple[FileLight, ...]
+    materials: tuple[str, ...] = ()
 
 
 class ObjectError(SceneError):
@@ -133,14 +135,15 @@ def bring(
     given = () if item.material is None else textures_of(item.material)
     surfaces = tuple(part.surface.overridden(override, given) for part in parts)
     check_textures(texture for surface in surfaces for texture in surface.textures)
-    return Brought(asset, baked, surfaces, _placed_lights(lights, matrix))
+    names = tuple(part.material for part in parts)
+    return Brought(asset, baked, surfaces, _placed_lights(lights, matrix), names)
 
 
 def _parts(parts: Sequence[Part], matrix: FloatArray | None, override: dict[str, object]) -> tuple[Part, ...]:
     if matrix is not None:
         parts = tuple(placed(part, matrix) for part in parts)
     if "color" in override:
-        parts = tuple(replace(part, colors=None) for part in parts)
+        parts = tuple(replace(part, colors=None, opacities=None) for part in parts)
     return tuple(parts)
 
 

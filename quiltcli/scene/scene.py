@@ -29,6 +29,10 @@ class Materials:
         unlit: (M,) materials that show exactly `color`.
         specular: (M,) 0 to 1, strength of the layer that reflects; metals reflect all the same.
         textures: the pictures that vary each.
+        opacity: (M,) alpha, 0 to 1; None where all are 1.
+        alpha: (M,) what alpha means, an index into `ALPHAS`; None where all are opaque.
+        cutoff: (M,) the least alpha that `mask` shows.
+        one_sided: (M,) surfaces seen from their front alone, where jobs ask for that; None for none.
     """
 
     color: Float32Array
@@ -38,6 +42,16 @@ class Materials:
     unlit: BoolArray
     specular: Float32Array
     textures: tuple[tuple[Texture, ...], ...] = ()
+    opacity: Float32Array | None = None
+    alpha: Int32Array | None = None
+    cutoff: Float32Array | None = None
+    one_sided: BoolArray | None = None
+
+
+VARY_ALPHA = ("color", "opacity")
+"""Roles of textures that bring an alpha."""
+ALPHAS = ("opaque", "mask", "blend")
+"""What a material's alpha means: nothing; whether a point is there; what share of light it holds up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +73,12 @@ class Scene:
         notices: sentences to tell the user once: what was dropped or assumed.
         uv: (V, 2) texture coordinates, v up, NaN where there are none; None when there are none at all.
         coverage: how the areas of the files' polygons compare with those of their triangles.
+        lets_light_by: objects that cast no shadows, indices into `objects`.
+        material_names: what materials are called, for mattes.
+        material_name: (T,) index into `material_names`; None for the first everywhere.
+        corner_motion: (T, 9) float32, how the first corner moves until the next frame, and what to add to
+            that for the others; NaN where nobody knows, None where nothing moves or nobody asks.
+        opacities: (V,) alpha of vertices, 0 to 1; None where all are 1.
         uv1: (V, 2) those of the second set, likewise.
         textures: the pictures that surfaces are covered with; None where there are none, and in a scene that
             was loaded to be looked into, not to be drawn.
@@ -78,8 +98,54 @@ class Scene:
     notices: tuple[str, ...]
     uv: FloatArray | None = None
     coverage: Coverage = NOTHING
+    lets_light_by: tuple[int, ...] = ()
+    material_names: tuple[str, ...] = ("",)
+    material_name: Int32Array | None = None
+    corner_motion: Float32Array | None = None
+    opacities: Float32Array | None = None
     uv1: FloatArray | None = None
     textures: Textures | None = None
+
+    @cached_property
+    def named(self) -> Int32Array:
+        """Index (T,) into `material_names`."""
+        return np.zeros_like(self.material) if self.material_name is None else self.material_name
+
+    @cached_property
+    def soft(self) -> BoolArray | None:
+        """Triangles (T,) that light may pass; None where there are none."""
+        table = self.materials
+        if table.alpha is None or table.opacity is None:
+            return None
+        varies = np.array([any(one.role in VARY_ALPHA for one in own) for own in table.textures], np.bool_)
+        if varies.size != table.alpha.size:
+            varies = np.zeros(table.alpha.size, dtype=np.bool_)
+        found = (varies | (table.opacity < 1)).take(self.material)
+        if self.opacities is not None:
+            found |= (self.opacities < 1).take(self.triangles).any(axis=1)
+        found &= (table.alpha > 0).take(self.material)
+        return found if found.any() else None
+
+    @cached_property
+    def invisible(self) -> BoolArray | None:
+        """Triangles (T,) whose material holds up no light anywhere; None where there are none."""
+        table = self.materials
+        if table.alpha is None or table.opacity is None or table.cutoff is None:
+            return None
+        masked = (table.alpha == ALPHAS.index("mask")) & (table.opacity < table.cutoff)
+        nothing = (masked | (table.opacity == 0)) & (table.alpha > 0)
+        return nothing.take(self.material) if nothing.any() else None
+
+    @cached_property
+    def one_sided(self) -> BoolArray | None:
+        """Triangles (T,) whose material is seen from the front alone; None where there are none."""
+        table = self.materials.one_sided
+        return None if table is None or not table.any() else table.take(self.material)
+
+    @cached_property
+    def corner_opacities(self) -> Float32Array | None:
+        """The first corner's opacity, and what to add for the others (T, 3); None where all are 1."""
+        return None if self.opacities is None else corner_table(self.opacities[:, None], self.triangles)
 
     @cached_property
     def planes(self) -> FloatArray:
@@ -119,7 +185,7 @@ class Scene:
     @cached_property
     def corner_colors(self) -> Float32Array | None:
         """The first corner's colour, and what to add for the others (T, 9); None where all are 1."""
-        return None if bool((self.colors == 1).all()) else _corner_table(self.colors, self.triangles)
+        return None if bool((self.colors == 1).all()) else corner_table(self.colors, self.triangles)
 
     def knowing(self, **tables: Any) -> Scene:
         """The same scene with some of the tables above, which need not be worked out then."""
@@ -146,7 +212,7 @@ def corner_normals_of(
     """`Scene.corner_normals` (T, 12) of triangles (T, 3) in planes (4, T), some of which (T,) are flat."""
     table = np.empty((len(triangles), 12), dtype=np.float32)
     own = normalized(planes[:3].T).astype(np.float32)
-    table[:, 0:9] = _corner_table(normals, triangles)
+    table[:, 0:9] = corner_table(normals, triangles)
     table[:, 9:12] = own
     alone = np.flatnonzero(flat)
     table[alone, 0:3] = own[alone]
@@ -154,7 +220,7 @@ def corner_normals_of(
     return table
 
 
-def _corner_table(values: Float32Array, triangles: Int32Array) -> Float32Array:
-    """Values (T, 9) at the first corner, and the second's and third's difference from it."""
+def corner_table(values: Float32Array, triangles: Int32Array) -> Float32Array:
+    """Values (T, 3·n) of n a vertex at the first corner, and the second's and third's difference from it."""
     first = values[triangles[:, 0]]
     return np.hstack((first, values[triangles[:, 1]] - first, values[triangles[:, 2]] - first))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from operator import or_
 from typing import Any, TypeAlias
 
@@ -15,13 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.channels import CHANNELS, MOST_HALF
-from quiltcli.geometry import FloatArray
+from quiltcli.geometry import FloatArray, IntArray
+from quiltcli.projection.gaze import Gaze
 from quiltcli.scene import Scene
 from quiltcli.scene.textures.coordinates import corner_coordinates
 from quiltcli.shading.adaptive import Shaded, shaded
 from quiltcli.shading.materials import albedo_wants
+from quiltcli.shading.mattes import identities_of
+from quiltcli.shading.motion import motion, motion_wants
 from quiltcli.shading.nodes import NodeColors
 from quiltcli.shading.shade import Shades, shading_wants
+from quiltcli.shading.shadows import CENTRE, Sample
 from quiltcli.shading.surface import shading_normals
 from quiltcli.shading.textures.covers import UNLIT
 from quiltcli.viewer.viewer import Viewer
@@ -35,13 +39,13 @@ class Source:
     """Where a channel's values come from.
 
     Attributes:
-        values: from viewer and shaded hits to an array for each layer, (G, k), (G, 1) where a group's
+        values: from gaze and shaded hits to an array for each layer, (G, k), (G, 1) where a group's
             pixels all have one value, or (1, 1) where all have, of any float or integer type.
         wanted: what of the hits that takes beside triangle and depth.
         light: whether it is light, which is known at few points where it is smooth.
     """
 
-    values: Callable[[Viewer, Shaded], Values | Sequence[Values]]
+    values: Callable[[Gaze, Shaded], Values | Sequence[Values]]
     wanted: Callable[[Scene], Wanted] = lambda _: Wanted.NOTHING
     light: bool = False
 
@@ -52,44 +56,44 @@ def canonical_depth(viewer: Viewer, z: FloatArray) -> FloatArray:
     return np.asarray((far + near) / (far - near) - 2 * far * near / ((far - near) * z))
 
 
-def _rgba(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+def _rgba(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
     return *_halves(shaded.total), np.ones((1, 1), dtype=np.float16)
 
 
-def _depth(viewer: Viewer, shaded: Shaded) -> Values:
+def _depth(gaze: Gaze, shaded: Shaded) -> Values:
     return shaded.hits.depth[None]
 
 
-def _canonical_depth(viewer: Viewer, shaded: Shaded) -> Values:
-    return canonical_depth(viewer, shaded.hits.depth)[None]
+def _canonical_depth(gaze: Gaze, shaded: Shaded) -> Values:
+    return canonical_depth(gaze.viewer, shaded.hits.depth)[None]
 
 
-def _facet(viewer: Viewer, shaded: Shaded) -> Values:
+def _facet(gaze: Gaze, shaded: Shaded) -> Values:
     return shaded.hits.facet[None, :, None] + 1
 
 
-def _object(viewer: Viewer, shaded: Shaded) -> Values:
+def _object(gaze: Gaze, shaded: Shaded) -> Values:
     return shaded.scene.object.take(shaded.hits.triangle)[None, :, None] + 1
 
 
-def _triangle(viewer: Viewer, shaded: Shaded) -> Values:
+def _triangle(gaze: Gaze, shaded: Shaded) -> Values:
     return shaded.hits.triangle[None, :, None] + 1
 
 
-def _normal(viewer: Viewer, shaded: Shaded) -> Values:
+def _normal(gaze: Gaze, shaded: Shaded) -> Values:
     return shading_normals(shaded.points)
 
 
-def _point(viewer: Viewer, shaded: Shaded) -> Values:
+def _point(gaze: Gaze, shaded: Shaded) -> Values:
     assert shaded.hits.position is not None
-    return shaded.hits.position + viewer.eye[:, None, None]
+    return shaded.hits.position + gaze.viewer.eye[:, None, None]
 
 
-def _albedo(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+def _albedo(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
     return _halves(shaded.albedo)
 
 
-def _texture_place(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+def _texture_place(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
     """Texture coordinates of the first set, v up."""
     seen = shaded.hits.points
     assert seen.weights is not None
@@ -98,21 +102,28 @@ def _texture_place(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
     return tuple(corners[:, 0] + second * seen.weights[0] + third * seen.weights[1])
 
 
-def _diffuse(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+def _diffuse(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
     return _halves(shaded.apart.diffuse)
 
 
-def _specular(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+def _specular(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
     return _halves(shaded.apart.specular)
 
 
-def _emission(viewer: Viewer, shaded: Shaded) -> Sequence[Values]:
+def _emission(gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
     return _halves(shaded.emission if shaded.cover == UNLIT else shaded.apart.emission)
 
 
 def normal_wants(scene: Scene) -> Wanted:
     """What shading normals ask of hits; normal maps bend them."""
     return Wanted.NORMAL if scene.textures is None else Wanted.NORMAL | Wanted.EDGES
+
+
+def _matte(channel: str, gaze: Gaze, shaded: Shaded) -> Sequence[Values]:
+    """Of one sample: the first rank covers all of the pixel."""
+    identity = identities_of(shaded.scene, channel, shaded.hits.triangle).view(np.float32)
+    rest = np.zeros((1, 1), dtype=np.float32)
+    return identity[:, None], rest + 1, *(rest,) * (len(CHANNELS[channel].layers) - 2)
 
 
 # Depths are measured in double precision and rounded once.
@@ -130,6 +141,9 @@ SOURCES: dict[str, Source] = {
     "diffuse": Source(_diffuse, shading_wants, light=True),
     "specular": Source(_specular, shading_wants, light=True),
     "emission": Source(_emission, shading_wants, light=True),
+    "motion": Source(motion, motion_wants),
+    "cryptoobject": Source(partial(_matte, "cryptoobject")),
+    "cryptomaterial": Source(partial(_matte, "cryptomaterial")),
 }
 
 
@@ -151,7 +165,12 @@ def wanted_for(names: Iterable[str], scene: Scene) -> Wanted:
 
 
 def shaded_for(
-    names: Iterable[str], drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray
+    names: Iterable[str],
+    drawing: Drawing,
+    wanted: Wanted,
+    scene: Scene,
+    eye: FloatArray,
+    sample: Sample = CENTRE,
 ) -> Iterator[Shaded]:
     """All that is seen of a drawing, as these channels are made of it fastest.
 
@@ -161,18 +180,25 @@ def shaded_for(
         wanted: what the hits shall tell, `wanted_for` the channels at least.
         scene: what was drawn.
         eye: (3,) from where it is seen.
+        sample: which sample of its pixels was drawn.
     """
     if any(SOURCES[name].light for name in names):
-        return shaded(drawing.regions(wanted, scene), scene, eye)
+        return shaded(drawing.regions(wanted, scene), scene, eye, sample)
     return (Shaded(scene, eye, hits) for hits in drawing.hits(wanted, scene))
 
 
-def fill(buffers: Mapping[str, Values], names: Iterable[str], viewer: Viewer, shaded: Shaded) -> None:
-    """Write the channels `names` of all hits into flat `buffers`, at the pixels the hits belong to."""
+def fill(
+    buffers: Mapping[str, Values],
+    names: Iterable[str],
+    gaze: Gaze,
+    shaded: Shaded,
+    some: IntArray | None = None,
+) -> None:
+    """Write the channels `names` of all hits, or of some, into flat `buffers`, at the hits' pixels."""
     for name in names:
         values_of = SOURCES[name].values
-        for layer, values in zip(CHANNELS[name].layers, values_of(viewer, shaded), strict=True):
-            shaded.hits.put(buffers[layer], values)
+        for layer, values in zip(CHANNELS[name].layers, values_of(gaze, shaded), strict=True):
+            shaded.hits.put(buffers[layer], values, some)
 
 
 _SCALE = 2.0**-112

@@ -16,7 +16,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from quiltcli.geometry import Float32Array, Int32Array
+from quiltcli.geometry import BoolArray, Float32Array, Int32Array
 from quiltcli.scene import Scene
 from quiltcli.shading.materials import (
     Colors,
@@ -120,6 +120,11 @@ def lobes_at(scene: Scene, seen: Points) -> Lobes:
 def alpha(scene: Scene, triangle: Int32Array) -> Values:
     """GGX's alpha of the triangles' materials, or a number where all have one."""
     return np.sqrt(at_materials(scene, _lobe_table(scene), triangle)[-1])
+
+
+def mirrors(scene: Scene, triangle: Int32Array) -> BoolArray:
+    """Whether the triangles' materials have a layer that reflects."""
+    return np.asarray(at_materials(scene, _lobe_table(scene), triangle)[9]) > 0
 
 
 @dataclass(frozen=True)

@@ -1,29 +1,35 @@
 """Lights at visible points: from where their light comes, how much of it, and how fast that changes.
 
-One row of `KINDS` for each kind of light. A light that is seen under an angle, as an area or a picture of
-the surroundings is, would be a row whose `arriving` says so for its samples one after the other.
+One row of `KINDS` for each kind of light. What is hidden of it is told in `shadows`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from quiltcli.geometry import Float32Array, FloatArray
-from quiltcli.scene.lights import Ambient, Directional, Headlight, Light, Point
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray
+from quiltcli.scene.lights import Ambient, Area, Directional, Environment, Headlight, Light, Point, Spot
 from quiltcli.scene.scene import Scene
+from quiltcli.shading.environment import Around, around
 from quiltcli.shading.nodes import Nodes, nodes_of
+from quiltcli.shading.rectangle import Received, mirrored_place, received_from
+from quiltcli.shading.shadows import Shadows, casts
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.draw import WholeTiles
+from quiltcli.visibility.rays.blockers import blockers_of, demand_blockers
 from quiltcli.visibility.resolve.vectors import PointVectors, along, products, sum_of_products
 
 # Nearer to a point light than this, in metres, its light does not grow any more.
 LEAST_DISTANCE = 1e-3
 _LEAST_DISTANCE2 = np.float32(LEAST_DISTANCE**2)
+_ONE = np.float32(1)
+_WIDE = 24.0
+"""How many times as far as a square reaches the place must be where light fades to nothing."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +42,35 @@ class Arrival:
             everywhere.
         vl: (n, k) cosine between eye and lamp; None where nobody asked.
         received: (n, k) or (n, 1) share of `color` that a surface receives; None for light from everywhere.
+        image: what a layer that reflects makes of it, where that differs: of a lamp with a size.
+        around: what comes from an environment, instead of all the others.
+        shown: (n, k) share of light from everywhere that nothing hides; None for all.
     """
 
     color: Float32Array
     nl: Float32Array | None = None
     vl: Float32Array | None = None
     received: Float32Array | None = None
+    image: Image | None = None
+    around: Around | None = None
+    shown: Float32Array | None = None
+
+
+@dataclass(frozen=True)
+class Image:
+    """The image of a lamp that has a size in n groups of k points: as of a lamp at its brightest place.
+
+    Attributes:
+        nl: (n, k) cosine between normal and that place, 0 where it is behind.
+        vl: (n, k) cosine between eye and that place.
+        received: (n, k) share of the lamp's colour that a surface there receives.
+        spread: (n, k) by how much the lamp's size widens the square of GGX's alpha.
+    """
+
+    nl: Float32Array
+    vl: Float32Array
+    received: Float32Array
+    spread: Float32Array
 
 
 @dataclass(frozen=True)
@@ -96,23 +125,71 @@ class Kind:
     placed: bool = False
 
 
-def arrivals(scene: Scene, surface: Surface, *, to_eye: bool) -> Iterator[Arrival]:
-    """The light of each lamp at surfaces; with its cosine `to_eye` if that is asked for."""
-    return (_arrival(light, surface, to_eye) for light in scene.lights)
+def arrivals(
+    lights: Sequence[Light], surface: Surface, shadows: Shadows | None, *, to_eye: bool
+) -> Iterator[Arrival]:
+    """The light of each lamp at surfaces; with its cosine `to_eye` if that is asked for.
+
+    Args:
+        lights: the lamps.
+        surface: the surfaces.
+        shadows: what is hidden of the lamps; None where nothing is to be.
+        to_eye: whether cosines to the eye are asked for.
+    """
+    for light in lights:
+        arrival = KINDS[type(light)].arriving(light, surface, to_eye)
+        if shadows is not None and casts(light):
+            reached = np.ones((1, 1), np.bool_) if arrival.received is None else arrival.received > 0
+            arrival = shaded(arrival, shadows.shown(light, reached))
+        yield arrival
 
 
-def _arrival(light: Light, surface: Surface, to_eye: bool) -> Arrival:
-    """The light of one lamp, less what is hidden of it."""
-    arrival = KINDS[type(light)].arriving(light, surface, to_eye)
-    shown = occlusion(light, surface)
-    if shown is None or arrival.received is None:
-        return arrival
-    return replace(arrival, received=arrival.received * shown)
+def shaded(arrival: Arrival, shown: Float32Array) -> Arrival:
+    """An arrival of which a share (n, k) is shown."""
+    if arrival.around is not None:
+        return replace(arrival, around=replace(arrival.around, shown=shown))
+    if arrival.received is None:
+        return replace(arrival, shown=shown)
+    image = arrival.image
+    if image is not None:
+        image = replace(image, received=image.received * shown)
+    return replace(arrival, received=arrival.received * shown, image=image)
 
 
-def occlusion(light: Light, surface: Surface) -> Float32Array | None:
-    """Share (n, k) of a light that nothing hides from points; None where that is all. Nothing hides yet."""
-    return None
+def reaches(light: Light, surface: Surface) -> BoolArray:
+    """Whether a lamp's light, if nothing hides it, reaches some point (k,) of n groups."""
+    received = KINDS[type(light)].arriving(light, surface, False).received
+    if received is None:
+        return np.ones(1, dtype=np.bool_)
+    return np.asarray((received > 0).any(axis=0))
+
+
+def has_surroundings(scene: Scene) -> bool:
+    """Whether light of a scene comes from a picture of all that is around."""
+    return any(isinstance(light, Environment) for light in scene.lights)
+
+
+def is_grey(light: Light) -> bool:
+    """Whether a lamp's light has no colour."""
+    red, green, blue = light.color
+    return bool(red == green == blue) and not isinstance(light, Environment)
+
+
+def casting(scene: Scene) -> tuple[Light, ...]:
+    """The lights of a scene that cast shadows."""
+    return tuple(light for light in scene.lights if casts(light))
+
+
+def demand_shadows(scene: Scene) -> None:
+    """Raise where a scene's shadows cannot be drawn (MissingExtraError)."""
+    if casting(scene):
+        demand_blockers()
+
+
+def prepare_shadows(scene: Scene) -> None:
+    """Make ready what shadows need of a scene."""
+    if casting(scene):
+        blockers_of(scene)
 
 
 def turns(scene: Scene, middle: Middle) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -132,6 +209,10 @@ def _everywhere(light: Ambient, surface: Surface, to_eye: bool) -> Arrival:
     return Arrival(light.color)
 
 
+def _around(light: Environment, surface: Surface, to_eye: bool) -> Arrival:
+    return Arrival(light.color, around=around(light, surface))
+
+
 def _from_afar(light: Directional, surface: Surface, to_eye: bool) -> Arrival:
     towards = -light.direction
     nl = _cosine(surface, out=along(surface.normal, towards))
@@ -144,22 +225,89 @@ def _afar(light: Directional, middle: Middle) -> tuple[FloatArray, FloatArray]:
 
 
 def _from_place(light: Point, surface: Surface, to_eye: bool) -> Arrival:
-    position = surface.points.position
-    assert position is not None
-    offset = (light.position - surface.eye).astype(np.float32)[:, None, None] - position.astype(np.float32)
+    return _arriving_from(light, surface, to_eye)[0]
+
+
+def _arriving_from(light: Point, surface: Surface, to_eye: bool) -> tuple[Arrival, Float32Array]:
+    """The light of a point, and unit directions (3, n, k) to it."""
+    offset = _offset(light.position, surface)
     towards = PointVectors(offset)
     nearness = np.reciprocal(np.maximum(products(towards, towards), _LEAST_DISTANCE2))
     offset *= np.sqrt(nearness)
     nl = _cosine(surface, out=products(surface.normal, towards))
     vl = _to_eye(surface, out=products(surface.ray, towards)) if to_eye else None
-    return Arrival(light.color, nl, vl, nl * nearness)
+    received = nl * nearness
+    if np.isfinite(light.reach):
+        # KHR_lights_punctual: clamp(1 − (distance / range)⁴) / distance².
+        faded = np.float32(light.reach**-4) / (nearness * nearness)
+        received *= np.maximum(_ONE - faded, np.float32(0))
+    return Arrival(light.color, nl, vl, received), offset
 
 
 def _place(light: Point, middle: Middle) -> tuple[FloatArray, FloatArray]:
     offset = (light.position - middle.place)[:, None] - middle.point
-    over = np.asarray(1 / np.sqrt(sum_of_products(offset, offset) + 1e-300))
+    distance = np.sqrt(sum_of_products(offset, offset) + 1e-300)
+    over = np.asarray(1 / distance)
     turn = middle.reach * over
-    return offset * over, np.where((1 - turn) > over * LEAST_DISTANCE, turn, np.inf)
+    calm = (1 - turn) > over * LEAST_DISTANCE
+    if np.isfinite(light.reach):
+        calm &= np.abs(distance - light.reach) > _WIDE * middle.reach
+    return offset * over, np.where(calm, turn, np.inf)
+
+
+def _from_spot(light: Spot, surface: Surface, to_eye: bool) -> Arrival:
+    arrival, towards = _arriving_from(light, surface, to_eye)
+    assert arrival.received is not None
+    share = sum_of_products(towards, -light.direction)
+    share *= np.float32(light.scale)
+    share += np.float32(light.offset)
+    np.minimum(np.maximum(share, np.float32(0), out=share), _ONE, out=share)
+    return replace(arrival, received=arrival.received * (share * share))
+
+
+def _spot_place(light: Spot, middle: Middle) -> tuple[FloatArray, FloatArray]:
+    towards, turn = _place(light, middle)
+    cosine = -sum_of_products(towards, light.direction.astype(np.float64)[:, None])
+    # The cone's edges: its light is 0 from one on, and at its greatest from the other.
+    change = turn * (np.sqrt(np.maximum(1 - cosine * cosine, 0)) + turn)
+    calm = np.abs(cosine - light.outer) > _WIDE * change
+    calm &= np.abs(cosine - light.inner) > 2 * change
+    return towards, np.where(calm, turn, np.inf)
+
+
+def _from_rectangle(light: Area, surface: Surface, to_eye: bool) -> Arrival:
+    got = received_from(light, surface)
+    nl = np.divide(got.received, got.angle, out=np.zeros_like(got.received), where=got.angle > 0)
+    image = _image(light, surface, got) if to_eye else None
+    return Arrival(light.color, nl, None if image is None else image.vl, got.received, image)
+
+
+def _image(light: Area, surface: Surface, got: Received) -> Image:
+    """The image of a rectangle in a layer, as of a lamp at the place of it that is nearest the image's.
+
+    The layer is wider by the lamp's own width, and no brighter than the lamp (Karis, Real Shading in
+    Unreal Engine 4, 2013: representative points).
+    """
+    offset = mirrored_place(light, surface)
+    towards = PointVectors(offset)
+    offset *= np.reciprocal(np.sqrt(np.maximum(products(towards, towards), _LEAST_DISTANCE2)))
+    nl = _cosine(surface, out=products(surface.normal, towards))
+    vl = _to_eye(surface, out=products(surface.ray, towards))
+    return Image(nl, vl, nl * got.angle, got.angle * np.float32(0.25 / np.pi))
+
+
+def _rectangle(light: Area, middle: Middle) -> tuple[FloatArray, FloatArray]:
+    towards, _ = _place(Point(light.color, light.position.astype(np.float32)), middle)
+    return towards, np.full(1, np.inf)
+
+
+def _offset(place: Float32Array, surface: Surface) -> Float32Array:
+    """Vectors (3, n, k) from points to a place (3,) in the world."""
+    position = surface.points.position
+    assert position is not None
+    start = (place - surface.eye).astype(np.float32)[:, None, None]
+    result: Float32Array = start - position.astype(np.float32)
+    return result
 
 
 def _from_eye(light: Headlight, surface: Surface, to_eye: bool) -> Arrival:
@@ -186,7 +334,10 @@ def _to_eye(surface: Surface, out: Float32Array) -> Float32Array:
 
 KINDS: dict[type[Light], Kind] = {
     Ambient: Kind(_everywhere, None),
+    Environment: Kind(_around, None),
     Directional: Kind(_from_afar, _afar),
     Point: Kind(_from_place, _place, placed=True),
+    Spot: Kind(_from_spot, _spot_place, placed=True),
+    Area: Kind(_from_rectangle, _rectangle, placed=True),
     Headlight: Kind(_from_eye, _eye),
 }

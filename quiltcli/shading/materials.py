@@ -64,7 +64,7 @@ def tint_at(scene: Scene, seen: Points) -> Colors | None:
     texels = texels_at(scene, seen, "color", COLOR)
     if scene.corner_colors is None:
         return None if texels is None else tuple(texels)
-    own = vertex_colors(scene.corner_colors, seen)
+    own = between_corners(scene.corner_colors, seen)
     return tuple(own if texels is None else own * texels)
 
 
@@ -82,9 +82,10 @@ def albedo_wants(scene: Scene) -> Wanted:
 
 
 def alpha_at(scene: Scene, seen: Points) -> Values:
-    """Alpha of the base colour's textures at points, straight as files have it; 1 where there is none."""
-    texels = texels_at(scene, seen, "color", ALPHA)
-    return np.float32(1) if texels is None else texels[0]
+    """Alpha of textures at points, straight as files have it; 1 where there is none."""
+    texels, own = texels_at(scene, seen, "color", ALPHA), value_at(scene, seen, "opacity")
+    alpha: Values = np.float32(1) if texels is None else texels[0]
+    return alpha if own is None else alpha * own
 
 
 def emission_at(scene: Scene, seen: Points) -> Colors:
@@ -148,8 +149,8 @@ def lit_at(scene: Scene, seen: Points) -> Values:
     return at_materials(scene, lit[:, None], seen.triangle)[0]
 
 
-def vertex_colors(table: Float32Array, seen: Points) -> Float32Array:
-    """Colours (3, n, k) between the corners of triangles, by the scene's `corner_colors`."""
+def between_corners(table: Float32Array, seen: Points) -> Float32Array:
+    """Values (3, n, k) between the corners of triangles, by a table (T, 9) such as `Scene.corner_colors`."""
     assert seen.weights is not None
     rows = columns(table, seen.triangle)
     value: Float32Array = rows[3:6] * seen.weights[0]

@@ -10,7 +10,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from quiltcli.display import Facets, corner_pixels, lit_facets
+from quiltcli.charts.shapes import turned
+from quiltcli.display import Facets, chart_points, corner_pixels, lit_facets
 from quiltcli.geometry import BoolArray, FloatArray, dot
 from quiltcli.job import JobFile
 from quiltcli.viewer.view import views_at
@@ -33,6 +34,9 @@ def settled_clip(job: JobFile, facets: Facets) -> str:
 def sees_behind(facets: Facets, viewer: Viewer) -> bool:
     """Whether a corner of a lit facet does not lie ahead of the eye along the look direction."""
     lit = their_lit_facets(facets, viewer)
+    if any(_curved_behind(facets, viewer)):
+        return True
+    lit &= ~facets.curved
     if not lit.any():
         return False
     nearest = np.minimum.reduceat(_ahead(facets, viewer), facets.corner_start[:-1])
@@ -46,14 +50,34 @@ def share_behind(facets: Facets, viewer: Viewer) -> float:
     """
     if not sees_behind(facets, viewer):
         return 0.0
-    lit = np.flatnonzero(their_lit_facets(facets, viewer))
+    lit = np.flatnonzero(their_lit_facets(facets, viewer) & ~facets.curved)
     ahead, pixels = _ahead(facets, viewer), corner_pixels(facets)
     whole = behind = 0.0
     for facet in lit.tolist():
         corners = slice(facets.corner_start[facet], facets.corner_start[facet + 1])
         whole += polygon_area(pixels[corners])
         behind += polygon_area(cut_polygon(pixels[corners], ahead[corners]))
+    for facet, share in enumerate(_curved_behind(facets, viewer)):
+        pixel_count = float(facets.size[facet].astype(np.int64).prod()) if share else 0.0
+        whole, behind = whole + pixel_count, behind + share * pixel_count
     return behind / whole if whole else 0.0
+
+
+def _curved_behind(facets: Facets, viewer: Viewer) -> list[float]:
+    """Shares of the lit places of facets, 0 for flat ones, that do not lie ahead of the eye."""
+    shares = []
+    theirs = their_lit_facets(facets, viewer) if facets.charts else ()
+    for chart, lit in zip(facets.charts, theirs, strict=False):
+        if chart is None or not lit:
+            shares.append(0.0)
+            continue
+        points = chart_points(chart)
+        if chart.stands:
+            points = points - viewer.eye[:, None]
+        elif chart.follows == "view":
+            points = turned(viewer.camera_from_world.T, points)
+        shares.append(float((viewer.look @ points <= 0).mean()) if points.size else 0.0)
+    return shares
 
 
 def their_lit_facets(facets: Facets, viewer: Viewer) -> BoolArray:

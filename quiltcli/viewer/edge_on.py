@@ -24,7 +24,7 @@ def edge_on_notices(facets: Facets, viewers: Iterable[Viewer]) -> Iterator[str]:
     frames: dict[tuple[int, ...], list[int]] = {}
     for viewer in viewers:
         height = dot(viewer.eye - facets.origin, facets.normal)
-        flat = facets.enabled & (np.abs(height) <= _FLAT)
+        flat = facets.enabled & ~facets.curved & (np.abs(height) <= _FLAT)
         if viewer.facets is not None:
             flat &= np.isin(np.arange(1, facets.count + 1), viewer.facets)
         if flat.any():

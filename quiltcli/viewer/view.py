@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from quiltcli.display import load_display
+from quiltcli.display import display_points, load_display
 from quiltcli.errors import Problem, QuiltError, ViewerError, raise_all
 from quiltcli.geometry import FloatArray
 from quiltcli.job import JobFile, ViewerSpec, load_display_file
@@ -62,25 +62,27 @@ class View:
         return self.eye if self.in_parts else ""
 
 
-def views_at(job: JobFile, frame: int, clip: str | None = None) -> tuple[View, ...]:
+def views_at(job: JobFile, frame: int, clip: str | None = None, later: float = 0.0) -> tuple[View, ...]:
     """The views of a frame, in the order in which they are drawn; the frame number alone decides.
 
     Args:
         job: the job.
         frame: frame number.
         clip: what near and far cut, `planar` or `distance`, where that has been settled.
+        later: how much later they look, in frames.
 
     Raises:
-        ViewerError: a path gives no usable pose at this frame.
+        ViewerError: a path gives no usable pose at this time.
     """
     if not job.is_stereo:
-        heads = (_head(job, name, frame, clip) for name in job.people)
-        return (View(frame, "", tuple(heads), frame),)
+        heads = (_head(job, name, frame + later, clip) for name in job.people)
+        return (View(frame, "", tuple(heads), frame + later),)
     views = []
     for eye in EYES:
-        late = eye == "right" and any(_eye_time(spec) == "own" for spec in job.people.values())
-        viewers = (_one_eye(job, name, frame, eye, clip) for name in job.people)
-        views.append(View(frame, eye, tuple(viewers), frame + 0.5 * late, job.output.stereo == "parts"))
+        own = any(_eye_time(spec) == "own" for spec in job.people.values())
+        late = later + 0.5 * (own and eye == "right")
+        viewers = (_one_eye(job, name, frame, eye, clip, later) for name in job.people)
+        views.append(View(frame, eye, tuple(viewers), frame + late, job.output.stereo == "parts"))
     return tuple(views)
 
 
@@ -93,11 +95,11 @@ def _head(job: JobFile, name: str, time: float, clip: str | None) -> Viewer:
     return replace(head, clip=clip, name=name, facets=spec.facets)
 
 
-def _one_eye(job: JobFile, name: str, frame: int, eye: str, clip: str | None) -> Viewer:
+def _one_eye(job: JobFile, name: str, frame: int, eye: str, clip: str | None, later: float) -> Viewer:
     """One eye of a viewer: half the separation from the head's place, along the head's right axis."""
     spec = job.people[name]
     assert spec.stereo is not None
-    head = _head(job, name, frame + 0.5 * (eye == "right" and _eye_time(spec) == "own"), clip)
+    head = _head(job, name, frame + later + 0.5 * (eye == "right" and _eye_time(spec) == "own"), clip)
     right = head.camera_from_world[0]
     side = spec.stereo.separation / 2 * (1 if eye == "right" else -1)
     return replace(head, frame=frame, eye=head.eye + side * right, head=head.eye)
@@ -111,7 +113,7 @@ def _middle_of(job: JobFile) -> FloatArray:
 @lru_cache(maxsize=8)
 def display_middle(path: Path, changed: int) -> FloatArray:
     """The middle (3,) of the box around a display, world metres."""
-    corners = load_display(load_display_file(path)).corners
+    corners = display_points(load_display(load_display_file(path)))
     return np.asarray((corners.min(axis=0) + corners.max(axis=0)) / 2)
 
 

@@ -34,6 +34,7 @@ class Viewer:
         name: of whoever looks, empty where there is nobody else.
         facets: ids of the only facets that are theirs; None for all.
         aimed: whether the path says how the head is turned; otherwise `look` goes to the display's middle.
+        then: (3,) where the eye is a frame later, world metres; None for at the same place.
     """
 
     frame: int
@@ -48,6 +49,7 @@ class Viewer:
     name: str = ""
     facets: tuple[int, ...] | None = None
     aimed: bool = True
+    then: FloatArray | None = None
 
     @property
     def camera_from_world(self) -> FloatArray:

@@ -17,6 +17,7 @@ from quiltcli.projection.planar import QuiltRays
 from quiltcli.scene import Scene
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.binning.pairs import Cones, Cores, Parts, common_value, lit_cones, pairs_of
+from quiltcli.visibility.binning.patches import with_patch_cones
 from quiltcli.visibility.draw import (
     BlockPairs,
     Blocks,
@@ -60,6 +61,7 @@ class BinPlan:
         cones: of the lit parts of the display.
         cores: of the same parts.
         culling: whether triangles that face away are left out.
+        single: (T,) triangles that are left out where they face away; None for none.
         reach: pixels by which samples lie beside the centres of their pixels, at most.
     """
 
@@ -71,6 +73,7 @@ class BinPlan:
     cores: Cores
     culling: bool
     reach: float
+    single: BoolArray | None = None
 
 
 @dataclass(frozen=True)
@@ -113,10 +116,25 @@ def bin_plan(
     *,
     culling: bool,
     reach: float = 0.0,
+    one_sided: bool = False,
 ) -> BinPlan:
-    """The plan of a frame; `parts` are the convex pieces of the facets, in the world."""
+    """The plan of a frame.
+
+    Args:
+        scene: the scene.
+        parts: the convex pieces of the facets, in the world.
+        blocks: the blocks of the layout.
+        viewer: the viewer.
+        rays: rays through the quilt.
+        culling: whether triangles that face away are left out.
+        reach: pixels by which samples lie beside the centres of their pixels, at most.
+        one_sided: whether those are that the scene's materials say are seen from one side.
+    """
     cones = lit_cones(parts, rays.lit, viewer.eye)
-    return BinPlan(scene, blocks, viewer, rays, cones, Cores(cones), culling, reach)
+    if rays.patched is not None:
+        cones = with_patch_cones(cones, rays.patched, blocks, reach)
+    single = scene.one_sided if one_sided else None
+    return BinPlan(scene, blocks, viewer, rays, cones, Cores(cones), culling, reach, single)
 
 
 def unseen(scene: Scene) -> Seen:
@@ -154,6 +172,8 @@ def bin_share(plan: BinPlan, part: slice, seen: Seen) -> Share:
     seen.cut[part] = cut
     if plan.culling:
         wanted &= faces_eye(scene.planes[:, part], eye)
+    elif plan.single is not None:
+        wanted &= ~plan.single[part] | faces_eye(scene.planes[:, part], eye)
     drawn = np.flatnonzero(wanted)
     drawn += part.start
     # First pass: all corners see one block, or the cones of facets decide (second pass).
@@ -199,7 +219,7 @@ def bin_frame(plan: BinPlan) -> Binned:
 
 def sight_of(scene: Scene, seen: Seen, *, culling: bool) -> Sight:
     """The scene from the eye, as far as it has been seen."""
-    return Sight(seen.vertices, scene.triangles, seen.cut, culling)
+    return Sight(seen.vertices, scene.triangles, seen.cut, culling, scene.soft)
 
 
 def faces_eye(planes: FloatArray, eye: FloatArray) -> BoolArray:

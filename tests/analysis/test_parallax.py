@@ -37,6 +37,15 @@ def test_points_beside_the_facet_do_not_count():
     assert facet_parallax(facets, 0, LEFT, RIGHT, points)[2].tolist() == [False, False, True]
 
 
+def test_points_as_far_away_as_the_eyes_are_nowhere_on_the_facet():
+    facets = panel(width=2, height=2, density=100)
+    points = np.array([[0.5, 0.0, 2.0], LEFT, RIGHT, [0.5, 0.0, 2.0 + 1e-15]])
+    world, pixels, inside = facet_parallax(facets, 0, LEFT, RIGHT, points)
+    assert not inside.any()
+    assert np.isfinite(world).all()
+    assert np.isfinite(pixels).all()
+
+
 def notices(job):
     facets = load_display(load_display_file(job.display))
     return list(stereo_notices(job, facets, load_scene(job.scene)))

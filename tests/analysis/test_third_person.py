@@ -81,6 +81,24 @@ def test_a_third_person_sees_display_eye_and_scene(tmp_path):
     assert np.count_nonzero(np.abs(ghost).max(axis=2) > 0.005) > before.sum()  # it shows through the wall
 
 
+def test_walls_seen_from_behind_hide_nobody(tmp_path):
+    (tmp_path / "room.yaml").write_text(
+        "quilt_display: 1\npanels:\n"
+        "- {name: left, pixels: [30, 30], size: [3 m, 3 m], at: [-1.5, 1.5, 0], yaw_deg: 90}\n"
+        "- {name: right, pixels: [30, 30], size: [3 m, 3 m], at: [1.5, 1.5, 0], yaw_deg: -90}\n"
+    )
+    (tmp_path / "ball.obj").write_text("v 0 1 -2\nv 1 1 -2\nv 0 2 -2\nf 1 2 3\n")
+    (tmp_path / "job.yaml").write_text(
+        "quilt_job: 1\ndisplay: room.yaml\nscene: ball.obj\nframes: 1\nviewer: {near: 0.05, far: 30, path:"
+        " {keyframes: [{frame: 1, position: [0, 1.6, 0], look_at: [0, 1.6, -9]}]}}\n"
+    )
+    from_aside = {"place": (6.0, 1.6, 0.0), "look_at": (0.0, 1.6, 0.0)}  # straight through the right wall
+    options = PictureOptions((60, 60), samples=1, third_person=True, scene="none", threads=1, **from_aside)
+    [found] = simulate(load_job(tmp_path / "job.yaml"), [1], options)
+    red, _, blue = found.picture[29:31, 29:31].mean(axis=(0, 1))
+    assert red > 0.3 > 4 * blue  # the eye, through a wall that takes three tenths of it
+
+
 def test_the_command_takes_it_but_compares_nothing(tmp_path):
     job = write_tiny_job(tmp_path)
     more = ["--third-person", "--size", "60x40", "--supersample", "1", "-j", "1"]

@@ -15,11 +15,11 @@ from typing import Any
 
 import click
 
-from tests.benchmarks import curves, duels, meshes, opengl, page, sequence, tables, textured
+from tests.benchmarks import curves, duels, meshes, opengl, page, sequence, shadowed, tables, textured
 from tests.benchmarks.race import canary, crowding
 
 ROOT = Path(__file__).parents[2]
-PARTS = ("duels", "textures", "sequences", "facets", "pixels", "triangles")
+PARTS = ("duels", "textures", "shadows", "sequences", "facets", "pixels", "triangles")
 
 
 @click.command(help=__doc__)
@@ -96,6 +96,10 @@ def _measure(
             for name in ("mixed",) if quick else textured.SCENES:
                 results.setdefault("textures", {})[name] = textured.measure(name, rounds, Path(scratch))
                 keep(f"textures, {name}")
+        if "shadows" in parts:
+            for name in ("mixed",) if quick else textured.SCENES:
+                results.setdefault("shadows", {})[name] = shadowed.measure(name, rounds)
+                keep(f"shadows, {name}")
         if "sequences" in parts:
             for compression in ("zip",) if quick else ("zip", "zstd"):
                 one = sequence.measure(meshes.detailed(3), 4 if quick else 20, compression, Path(scratch))
@@ -120,6 +124,8 @@ def _tell(results: Mapping[str, Any], clock: str) -> None:
         click.echo("\n" + tables.time_table(results, clock) + "\n\n" + tables.ratio_table(results, clock))
     if "textures" in results:
         click.echo("\n" + tables.texture_table(results))
+    if "shadows" in results:
+        click.echo("\n" + tables.shadow_table(results))
     if "sequences" in results:
         click.echo("\n" + tables.sequence_table(results))
     for rows in made.values():

@@ -49,6 +49,8 @@ def _tables(results: Mapping[str, Any], curves: Mapping[str, Rows]) -> dict[str,
         found["ratios"] = tables.ratio_table(results)
     if "textures" in results:
         found["textures"] = tables.texture_table(results)
+    if "shadows" in results:
+        found["shadows"] = tables.shadow_table(results)
     if "sequences" in results:
         found["sequences"] = tables.sequence_table(results)
     found |= {name: tables.curve_table(rows) for name, rows in curves.items()}

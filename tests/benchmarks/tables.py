@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tests.benchmarks.race import ratio, seconds
+from tests.benchmarks.shadowed import cost
 from tests.benchmarks.targets import KINDS, targets
 from tests.benchmarks.textured import nanoseconds
 
@@ -83,6 +84,17 @@ def ratio_table(results: Mapping[str, Any], clock: str = "wall") -> str:
     embree = ("keys / Embree", "bin + keys / Embree", "frame / Embree")
     others = ("frame / GL draws", "… and read", "matte / GL matte", "… and read", "frame / ZIP")
     return table(("scene/display", "", *embree, *others), rows, 2)
+
+
+def shadow_table(results: Mapping[str, Any]) -> str:
+    """What shadows take, by scene and lamp."""
+    rows = []
+    for name, found in results["shadows"].items():
+        for kind in found["lamps"]:
+            without, with_them = (nanoseconds(found, f"{kind}, {how}") for how in ("without", "with"))
+            rows.append((name, kind, f"{without:,.0f}", f"{with_them:,.0f}", f"{cost(found, kind):,.0f}"))
+    head = ("scene", "", "ns a pixel without", "with", "ns a pixel and lamp")
+    return table(head, rows, 2)
 
 
 def texture_table(results: Mapping[str, Any]) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tests.benchmarks.race import ratio
+from tests.benchmarks.shadowed import cost
 
 KINDS = ("culled", "two-sided")
 _EMBREE = "/ Embree, 1 thread"
@@ -35,6 +36,10 @@ def targets(results: Mapping[str, Any]) -> list[Target]:
     duels = {name: found["times"] for name, found in results.get("duels", {}).items()}
     found = [*_visibility(duels), *_frames(duels), *_sequences(results.get("sequences", []))]
     found += _textures({name: one["times"] for name, one in results.get("textures", {}).items()})
+    for name, one in results.get("shadows", {}).items():
+        for kind in ("a sun", "a point", "two points"):
+            what = f"shadows of {kind}, a pixel and lamp"
+            found.append(Target(what, f"{name}/cube", cost(one, kind), 250, " ns"))
     return [target for target in found if not math.isnan(target.value)]
 
 

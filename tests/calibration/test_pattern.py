@@ -23,6 +23,7 @@ from quiltcli.calibration.pattern_files import page_pattern, write_patterns
 from quiltcli.errors import OutputError
 from quiltcli.formats.drawing.font import HEIGHT, text_mask, text_width
 from quiltcli.formats.exr.image import read_exr
+from quiltcli.images.diff import read_image
 from quiltcli.images.facets import facet_image, page_of
 from quiltcli.images.unmap import unmap
 from quiltcli.layout import pixel_owners
@@ -84,6 +85,14 @@ def test_pixels_of_no_facet_are_transparent_black():
             np.testing.assert_array_equal(np.where(inside, 1, 0), channel)
 
 
+@pytest.mark.parametrize("form", ["png", "exr"])
+def test_pixels_of_no_facet_are_black_where_that_is_asked_for(form, tmp_path):
+    layout = turned_layout()
+    for path in write_patterns(layout, tmp_path, ["marker"], image_format=form, opaque=True):
+        (image,) = read_image(path)
+        assert (image.channels["A"] == 1).all()
+
+
 def test_the_flag_of_the_marker_shows_every_turn_and_mirror():
     image = draw("marker", whole(41, 41))
     pictures = {picture.tobytes() for quarter in range(4) for turned in [np.rot90(image, quarter)]
@@ -97,6 +106,10 @@ def test_the_arrow_points_up_and_the_pennant_right():
     red = np.argwhere((image == (1, 0, 0)).all(axis=2))
     widest = np.bincount(white[:, 0]).argmax()
     assert widest < white[:, 0].mean()
+    # It has a point, and grows from there row by row to the head's end.
+    rows = np.bincount(white[:, 0])[white[:, 0].min() : widest + 1]
+    assert rows[0] == 1
+    assert (np.diff(rows) >= 0).all()
     assert red[:, 1].min() > white[:, 1][white[:, 0] == white[:, 0].max()].max()
 
 
@@ -264,7 +277,7 @@ def test_wrong_wishes_are_told_together(tmp_path):
     with pytest.raises(OutputError) as caught:
         write_patterns(turned_layout(), tmp_path / "new", ["id", "grit"], image_format="gif", step=0)
     assert str(caught.value).splitlines() == [
-        "unknown pattern 'grit' (known: id, marker, border, grid, checker, gradient, white)",
+        "unknown pattern 'grit' (known: id, marker, border, grid, checker, gradient, white, markers)",
         "unknown image format 'gif' (known: png, exr)",
         "a step of 0 pixels; it must be 1 or more",
     ]

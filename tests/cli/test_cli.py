@@ -118,7 +118,7 @@ def test_schema_prints_the_schema_of_a_kind(kind: str, tmp_path: Path) -> None:
         (["pattern", "--kind"], "a", ["all"]),
         (["render", "--set"], "render.sam", ["render.samples="]),
         ([], "ver", ["verify"]),
-        (["schema"], "", ["job", "display", "layout", "scene"]),
+        (["schema"], "", ["job", "display", "layout", "scene", "lightfield", "calibration"]),
     ],
 )
 def test_a_shell_completes_commands_and_the_words_that_options_know(
@@ -370,12 +370,12 @@ def test_facets_are_only_merged_into_their_own_job(tiny: Path) -> None:
 SLOW = """
 import sys, time
 import quiltcli.render.sequence as render
-draw = render.draw_view
-def slow(stage, view, *rest, **how):
-    print("drawing", view.frame, flush=True)
+draw = render.draw_moment
+def slow(moment, *rest, **how):
+    print("drawing", moment.view.frame, flush=True)
     time.sleep(0.3)
-    return draw(stage, view, *rest, **how)
-render.draw_view = slow
+    return draw(moment, *rest, **how)
+render.draw_moment = slow
 from quiltcli.cli import main
 main.main(["render", "job.yaml"], prog_name="quilt")
 """

@@ -55,7 +55,7 @@ def test_check_and_simulate_say_what_render_says(job: Path, tmp_path: Path) -> N
         "objects[0].material.color [180, 80, 25] reflects more light than falls on it"
         " (divide 8-bit values by 255 and make them linear)",
         "the scene has no lights: a headlight at the viewer and a dim ambient light are used",
-        "the bleed of 2 pixels is wider than the layout's padding of 1: neighbours share what lies between them",
+        "the bleed of 2 pixels is wider than the layout's padding of 1: neighbours share what lies between them (set layout.padding to 2, or set render.bleed to 1)",
     ]
     for command in (
         ("check", "job.yaml"),

@@ -42,3 +42,21 @@ def test_a_mistyped_kind_is_said_before_anything_is_asked() -> None:
     result = CliRunner().invoke(main, ["new", "wal", "-o", "x"])
     assert result.exit_code == 2
     assert "expected one of corner, wall" in result.output
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["cave", "--size", "3x3x3m", "--radius", "5m", "--no-treads"],
+         "--radius, --no-treads: means nothing to a cave (which takes --size, --base, --ceiling)"),
+        (["wall", "--size", "3x2m", "--ceiling"],
+         "--ceiling: means nothing to a wall (which takes --size, --base)"),
+        (["wall", "--size", "3x2m", "--padding", "2"],
+         "--padding is between panels on a canvas (expected --canvas 2112x1024, too)"),
+    ],
+)  # fmt: skip
+def test_what_means_nothing_to_a_kind_is_told(words: list[str], expected: str, tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, ["new", *words, "--pitch", "10mm", "-o", str(tmp_path / "n")])
+    assert result.exit_code == 2
+    assert expected in result.output
+    assert not (tmp_path / "n").exists()

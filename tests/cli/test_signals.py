@@ -36,14 +36,14 @@ quiltcli.__main__.run()
 DRAWING = """
 import time
 from quiltcli.render import sequence
-draw = sequence.draw_view
-def slow(stage, view, *rest, **how):
-    print("drawing", view.frame, flush=True)
+draw = sequence.draw_moment
+def slow(moment, *rest, **how):
+    print("drawing", moment.view.frame, flush=True)
     end = time.monotonic() + 0.5
     while time.monotonic() < end:
         time.sleep(0.01)
-    return draw(stage, view, *rest, **how)
-sequence.draw_view = slow
+    return draw(moment, *rest, **how)
+sequence.draw_moment = slow
 sequence.worth_forking = lambda stage: True
 import sys
 sys.argv[1:] = ["render", "job.yaml", "-j", "2"]

@@ -54,6 +54,24 @@ def moved(polygon: FloatArray, x: float, y: float, z: float) -> FloatArray:
     return polygon + np.array([x, y, z])
 
 
+def textured(*places: tuple[object, object]) -> PolygonMesh:
+    """A mesh of polygons, each with its texture coordinates."""
+    mesh = mesh_of(*(polygon for polygon, _ in places))
+    return replace(mesh, uv=np.concatenate([np.asarray(uv, np.float64) for _, uv in places]))
+
+
+def test_without_a_resolution_the_texture_tells_how_many_pixels_there_are():
+    square = np.array([(0, 0, 0), (0.004, 0, 0), (0.004, 0.004, 0), (0, 0.004, 0)])
+    unit_uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    strip = [(0, 0, 1), (0.01, 0, 1), (0.01, 10, 1), (0, 10, 1)]
+    mesh = textured((square, unit_uv), (strip, np.full((4, 2), 0.5)), (strip, np.full((4, 2), np.nan)))
+    own = DisplayFile.model_validate({"mesh": "m.obj", "layout": {"from_uv": True, "size": [64, 64]}})
+    apart = mesh.vertices + np.repeat([(0, 0, 0), (0, 0, 0), (1, 0, 0)], 4, axis=0)
+    facets = build_facets(replace(mesh, vertices=apart), own)
+    assert facets.size.tolist() == [[64, 64], [1, 1000], [1, 1000]]
+    assert np.allclose(facets.du[0], [0.004 / 64, 0, 0], rtol=1e-12, atol=0)
+
+
 # A 1.92 × 1.08 m panel that faces +Z, from its lower left.
 PANEL = np.array([(0, 0, 0), (1.92, 0, 0), (1.92, 1.08, 0), (0, 1.08, 0)])
 FLOOR = [(0, 0, 0), (2, 0, 0), (2, 0, -1), (0, 0, -1)]

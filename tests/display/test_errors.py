@@ -56,6 +56,11 @@ BAD_DISPLAYS = {
     "over 65536 × over 65536 pixels (expected 1 to 65536 a side)",
     "resolution: {pixels_per_metre: 0.5}\n": "FILE:3:32: resolution.pixels_per_metre: makes facet 1 "
     "less than 1 × less than 1 pixels (expected 1 to 65536 a side)",
+    "layout: {from_uv: true, size: [64, 64]}\nresolution: {pixels_per_metre: 0.5}\n": "FILE:4:32: "
+    "resolution.pixels_per_metre: makes facet 1 less than 1 × less than 1 pixels (expected 1 to 65536 a side; "
+    "leave resolution out, since the texture coordinates tell)",
+    "layout: {from_uv: true, size: [64, 64]}\n": "FILE:3:9: layout: the mesh has no texture coordinates "
+    "(expected them, or resolution beside another layout)",
     "resolution: {facet_pixels: [70000, 10]}\n": "FILE:3:28: resolution.facet_pixels: makes facet 1 "
     "over 65536 × 10 pixels (expected 1 to 65536 a side)",
     "facets: {1: {facet_pixels: [10, 70000]}}\n" + DENSITY: "FILE:3:28: facets.1.facet_pixels: makes facet 1 "

@@ -153,7 +153,10 @@ def test_panels_keep_their_places_on_the_canvas(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("quilt_display: 1\nunits: m\n", "mesh: missing key (polygon mesh; or panels: flat rectangles)"),
+        (
+            "quilt_display: 1\nunits: m\n",
+            "mesh: missing key (polygon mesh; or panels: flat rectangles; or surfaces; or a projection)",
+        ),
         (WALLS.replace("pitch: 5 cm, ", ""), "expected pitch or size, got neither"),
         (WALLS.replace("5 cm", "5 parsec"), "expected a length such as 6 mm, 1/6 mm or a number"),
         (WALLS.replace("5 cm", "0 cm"), "must be greater than 0"),

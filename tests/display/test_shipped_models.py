@@ -141,3 +141,12 @@ def test_panels_of_cube5_are_whole_panels() -> None:
     assert facets.size.tolist() == [[1920, 1080]] * 4 + [[1920, 1920]]
     np.testing.assert_allclose(np.linalg.norm(facets.du, axis=1), 0.27675e-3)
     np.testing.assert_allclose(np.linalg.norm(facets.dv, axis=1), 0.27675e-3)
+
+
+@pytest.mark.parametrize("name", generate.CURVED)
+def test_curved_displays_are_what_the_generator_writes_and_can_be_built(name: str) -> None:
+    assert (FOLDER / f"{name}.yaml").read_text() == generate.curved_text(name)
+    facets = load(name)
+    assert facets.count == 1
+    assert facets.curved.all()
+    assert 1.5e6 < np.prod(facets.size[0], dtype=np.int64) < 17e6

@@ -13,7 +13,9 @@ from quiltcli.display import lit_facets, load_display, shared_edges
 from quiltcli.errors import JobError, LayoutError, OutputError, QuiltError
 from quiltcli.exchange.newjob.figures import length_text, read_grain, read_sides
 from quiltcli.exchange.newjob.kinds import KINDS, Wishes, missing
+from quiltcli.exchange.newjob.plan import draw_plan
 from quiltcli.exchange.newjob.write import new_job, write_new_job
+from quiltcli.formats.drawing.shapes import Label
 from quiltcli.job import load_display_file
 from quiltcli.job.lengths import read_length
 from quiltcli.layout import read_layout
@@ -191,3 +193,26 @@ def test_the_panels_of_the_page_are_what_it_says(tmp_path: Path) -> None:
     facets = load_display(load_display_file(tmp_path / "display.yaml"))
     np.testing.assert_allclose(facets.polygon(0)[1], facets.polygon(1)[0], atol=1e-12)
     assert facets.size.tolist() == [[1333, 750], [750, 750]]
+
+
+@pytest.mark.parametrize(
+    ("kind", "figures"),
+    [
+        ("cave", {"size": "3x3x2.5m", "pixels": "400x333"}),
+        ("corner", {"left": "8x4.5m", "right": "6x4.5m", "pitch": "6mm"}),
+        ("cylinder", {"size": "2x1.5m", "columns": 12, "pitch": "6mm"}),
+        ("stairs", {"size": "4x0.16x0.3m", "steps": 5, "pitch": "6mm"}),
+    ],
+)
+def test_no_label_of_a_plan_lies_on_another(kind: str, figures: dict, tmp_path: Path) -> None:
+    job = new_job(Wishes(kind, **figures), tmp_path)
+    labels = [item for item in draw_plan(kind, job.facets, job.stand).items if isinstance(item, Label)]
+    boxes = [
+        (label.x - wide * (label.anchor == "middle") / 2, label.y, wide, label.size)
+        for label in labels
+        for wide in [0.5 * label.size * len(label.text)]
+    ]
+    for k, (x, y, wide, high) in enumerate(boxes):
+        for u, v, across, down in boxes[:k]:
+            beside = x + wide <= u or u + across <= x
+            assert beside or abs(y - v) >= (high + down) / 2, (labels[k].text, u, v)

@@ -13,6 +13,9 @@ from click.testing import CliRunner
 from PIL import Image
 
 from quiltcli.cli import main
+from quiltcli.job.layout_columns import columns_bytes
+from quiltcli.job.layout_table import columns_of
+from quiltcli.layout import read_layout
 from tests.helpers.tiny_job import write_tiny_job
 
 JOB = """\
@@ -186,6 +189,8 @@ KINDS = (
     Kind("display", "display.yaml", "yaml", ("check display.yaml", "info display.yaml", "pack display.yaml --method rows --size 80x80 -o l.yaml", "check l.yaml")),
     Kind("scene", "scene.yaml", "yaml", ("check scene.yaml", "info scene.yaml", _RENDER)),
     Kind("layout", "layout.yaml", "yaml", ("check layout.yaml", "info layout.yaml", *_EXPORTS)),
+    Kind("columns", "c.npz", "bytes", ("check c.yaml", "info c.yaml")),
+    Kind("columns-zip", "c.npz", "zip", ("check c.yaml", "info c.yaml")),
     Kind("yaml-text", "job.yaml", "text", ("check job.yaml", "info job.yaml")),
     Kind("set", "", "set", ("render job.yaml --dry-run --overwrite",)),
     Kind("obj", "m.obj", "text", _mesh("obj")),
@@ -243,6 +248,9 @@ def write_seeds(folder: Path) -> None:
         words = [str(folder / word) if "." in word or word == "cut" else word for word in command.split()]
         result = CliRunner().invoke(main, words)
         assert result.exit_code == 0, (command, result.output)
+    data, _ = columns_bytes(columns_of(read_layout(folder / "layout.yaml")))
+    (folder / "c.npz").write_bytes(data)
+    (folder / "c.yaml").write_text("quilt_layout: 1\npages:\n- size: [80, 80]\ncolumns: c.npz\n")
 
 
 def _write_binary_meshes(folder: Path) -> None:

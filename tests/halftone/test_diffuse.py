@@ -113,3 +113,14 @@ def test_a_wavefront_is_the_definition_with_all_rows_from_left_to_right() -> Non
         np.testing.assert_array_equal(bits, expected)
         assert error[~inside].max() == error[~inside].min() == 0
         assert bits.sum() + lost == pytest.approx(float(image[inside].sum()), abs=1e-3)
+
+
+def test_bits_do_not_depend_on_where_other_images_are_lit() -> None:
+    rng = np.random.default_rng(8)
+    tones = rng.random((3, 12, 14), dtype=np.float32)
+    inside = np.zeros(tones.shape, dtype=np.bool_)
+    for number, top in enumerate((3, 2, 5)):
+        inside[number, top : top + 6, 2 + number : 12] = True
+    together = diffuse(tones, inside, ostromoukhov())
+    for image, where, bits in zip(tones, inside, together, strict=True):
+        assert np.array_equal(diffuse(image[None], where[None], ostromoukhov())[0], bits)

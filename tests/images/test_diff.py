@@ -262,6 +262,27 @@ def test_the_table_has_a_line_for_each_channel(tmp_path):
     ]
 
 
+def test_each_channel_has_a_verdict_of_its_own(tmp_path):
+    pixels = {"A": np.ones((10, 10), np.float32), "R": np.zeros((10, 10), np.float32)}
+    other = {name: values.copy() for name, values in pixels.items()}
+    other["R"][0, :3], other["A"][0, 0] = 0.5, 1.25
+    a, b = tmp_path / "a.exr", tmp_path / "b.exr"
+    write_exr(a, pixels, {})
+    write_exr(b, other, {})
+
+    def verdicts(**limits):
+        return [(row[2], row[3]) for row in diff_rows(diff(a, b, Limits(**limits)))]
+
+    assert verdicts() == [("A", "fail"), ("R", "fail")]
+    assert verdicts(fail=0.3, warn=0.1) == [("A", "warn"), ("R", "fail")]
+    assert verdicts(fail=0.3, warn=0.3) == [("A", "match"), ("R", "fail")]
+    assert verdicts(fail_percent=2, warn_percent=2) == [("A", "match"), ("R", "fail")]
+    other["R"][0, :3], other["A"][1, :3] = 0, 0.5
+    other["R"][2, :3] = 1
+    write_exr(b, other, {})
+    assert verdicts(fail_percent=5, warn_percent=5) == [("A", "match"), ("R", "match"), ("together", "fail")]
+
+
 def test_the_table_says_what_went_wrong(tmp_path):
     write_exr(tmp_path / "a.exr", image(), {})
     (line,) = diff_rows(diff(tmp_path / "a.exr", tmp_path / "no.exr"))

@@ -1,5 +1,6 @@
 """Attributes of the images, and which images are complete."""
 
+import json
 import os
 from fractions import Fraction
 
@@ -34,6 +35,15 @@ def test_the_eye_is_a_v3f(tmp_path):
     path = tmp_path / "a.exr"
     write_exr(path, noise(), provenance())
     assert b"quilt:eye\0v3f\0" in path.read_bytes()
+
+
+def test_the_pose_is_there_to_the_last_bit(tmp_path):
+    path = tmp_path / "a.exr"
+    write_exr(path, noise(), provenance())
+    pose = json.loads(read_header(path).attributes["quilt:pose"])
+    for name in ("eye", "look", "up"):
+        assert pose[name] == getattr(VIEWER, name).tolist()
+    assert (pose["near"], pose["far"]) == (VIEWER.near, VIEWER.far)
 
 
 def test_complete_means_whole_and_of_this_job(tmp_path):

@@ -63,7 +63,7 @@ def messages(load: Callable[[], object], folder: Path) -> list[str]:
 
 
 def test_there_are_many_cases_and_none_twice() -> None:
-    assert len(CASES) == len({case.title for case in CASES}) == 143
+    assert len(CASES) == len({case.title for case in CASES}) == 146
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.title)
@@ -137,7 +137,8 @@ def test_job_brings_up_the_problems_of_the_files_it_names(tmp_path: Path) -> Non
     edited(tmp_path, "job.yaml", "scene: mesh.obj", "scene: scene.yaml")
     edited(tmp_path, "scene.yaml", "", "ligths: []\n")
     expected = [
-        "display.yaml:1:1: mesh: missing key (polygon mesh; or panels: flat rectangles)",
+        "display.yaml:1:1: mesh: missing key (polygon mesh; or panels: flat rectangles; or surfaces;"
+        " or a projection)",
         "scene.yaml:4:1: ligths: unknown key (did you mean 'lights'?)",
     ]
     assert messages(lambda: load_job(job), tmp_path) == expected
@@ -156,8 +157,8 @@ def test_mesh_as_scene_must_be_there(tmp_path: Path) -> None:
 def test_a_file_of_no_kind_is_named_so(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("a: 1\n")
     assert messages(lambda: file_kind(tmp_path / "a.yaml"), tmp_path) == [
-        "a.yaml:1:1: this is no file of quilt's (expected quilt_display: 1, quilt_layout: 1, quilt_scene: 1"
-        " or quilt_job: 1 as the first key)"
+        "a.yaml:1:1: this is no file of quilt's (expected quilt_display: 1, quilt_layout: 1, quilt_scene: 1,"
+        " quilt_job: 1, quilt_lightfield: 1 or quilt_calibration: 1 as the first key)"
     ]
 
 

@@ -17,10 +17,12 @@ DOCS = Path(__file__).parents[2] / "docs"
 MEASURES = r"metre|pixel|degree|second|frame|m, cm|megabyte|linear|radian|m/s|Hz"
 # Keys whose number is a bare one: counts, ratios, factors, numbers of things, directions.
 BARE = {
-    *("quilt_display", "quilt_job", "quilt_layout", "quilt_scene"),
+    *("quilt_display", "quilt_job", "quilt_layout", "quilt_scene", "quilt_lightfield", "quilt_calibration"),
+    *("views", "first_view", "first_row", "count"),
     *("id", "page", "max_pages", "page_facets", "samples"),
-    *("aspect", "metallic", "roughness", "specular", "scale", "matrix", "facets"),
-    *("look", "up", "direction", "color", "emission", "orientation"),
+    *("aspect", "metallic", "roughness", "specular", "opacity", "cutoff", "scale", "matrix", "facets"),
+    *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces", "threshold"),
+    *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),
     *("uv_set", "offset", "strength"),
 }
 

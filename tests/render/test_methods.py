@@ -20,6 +20,7 @@ from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame as rasterize_frame
 from quiltcli.render.methods import draw_frame
 from quiltcli.render.methods.twopass import picture_size
+from quiltcli.render.notices import job_warnings
 from quiltcli.render.sequence import RenderOptions, render
 from quiltcli.render.setup import set_stage
 from quiltcli.viewer.view import viewers_of
@@ -376,6 +377,36 @@ def test_two_passes_repeat_the_picture_where_its_pixels_are_the_facets(tmp_path:
         np.testing.assert_allclose(twice[name], values, atol=1e-6 if values.dtype.kind == "f" else 0)
 
 
+def test_two_passes_say_what_of_a_display_around_the_eye_they_leave_empty(tmp_path: Path) -> None:
+    (tmp_path / "room.obj").write_text(
+        "".join(f"v {x} {y} {z}\n" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
+        + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+    )
+    (tmp_path / "room.yaml").write_text(
+        "quilt_display: 1\nmesh: room.obj\nviewing_side: both\nresolution: {facet_pixels: [40, 40]}\n"
+    )
+    (tmp_path / "job.yaml").write_text(
+        f"quilt_job: 1\ndisplay: room.yaml\nscene: {SCENES / 'ball.obj'}\nframes: 1-2\n"
+        "viewer: {near: 0.1, far: 9, path: {keyframes:"
+        " [{frame: 1, position: [0, 0, 0], look_at: [0, 0, -1]}]}}\n"
+        "render: {method: twopass, bleed: 0, depth: radial}\n"
+    )
+    job = load_job(tmp_path / "job.yaml")
+    stage, viewer = set_stage(job), viewers_of(job, [1])[0]
+    _, record = by(stage, viewer, "twopass")
+    # Of 6 sides 1 is ahead within 45°; 60° cut the four beside it at 1/tan 60° of their depth.
+    share = 100 * (1 + 4 * (1 - (1 - 1 / np.sqrt(3)) / 2)) / 6
+    words = [w for w in record.warnings if "outside the picture" in w]
+    assert float(words[0].split(" %")[0]) == pytest.approx(share, abs=1.5)
+    told = [w for w in job_warnings(job, stage.facets, stage.layout) if "twopass" in w]
+    assert told == [
+        "render.method twopass draws 120 degrees about the look direction: in frames 1-2 lit facets reach"
+        " beyond, and their pixels there stay empty (every other method draws all around)"
+    ]
+    other = by(stage, viewer, "homography")[1]
+    assert not any("outside the picture" in words for words in other.warnings)
+
+
 def test_the_first_pass_has_as_many_pixels_as_the_lit_facets(plates) -> None:
     stage, viewer = plates
     lit = lit_facets(stage.facets, viewer.eye)
@@ -422,8 +453,8 @@ def test_exact_depth_takes_the_fast_path(plates) -> None:
     [
         (
             "render.method=raycats",
-            "expected homography, offaxis, raskar, zscale, twopass or raycast, got the text 'raycats'"
-            " (did you mean 'raycast'?)",
+            "expected homography, offaxis, raskar, zscale, twopass, raycast, cubemap, tessellate, exact or"
+            " vertex, got the text 'raycats' (did you mean 'raycast'?)",
         ),
         ("render.depth_bits=17", "expected 16, 24 or 32f, or no such key, got 17"),
         ("render.depth_bits=yes", "expected 16, 24 or 32f, or no such key, got the text 'yes'"),

@@ -59,6 +59,7 @@ def test_a_report_says_what_made_it_and_how(tmp_path):
                 "lit_facets": 423,
                 "visible_pixels": 1000003,
                 "fill": 0.75,
+                "binned": True,
                 "settled_share": 0.8,
                 "replication": 1.1,
                 "wall_seconds": 0.0,
@@ -144,6 +145,15 @@ def test_shares_of_an_empty_scene():
     empty = record(1, triangles=0, reaching=0, pairs=0, settled=0)
     assert empty.settled_share == 1.0
     assert empty.replication == 0.0
+
+
+def test_a_method_that_does_not_bin_has_no_figures_of_it():
+    cast = record(1, reaching=0, pairs=0, settled=0, binned=False)
+    told = dict(summary([cast]))
+    assert not {"settled in pass 1", "replication"} & told.keys()
+    assert "lit facets" in told
+    assert cast.as_json()["binned"] is False
+    assert dict(summary([cast, record(2)]))["settled in pass 1"] == "80.0 % "[:-1]
 
 
 # --- time ---

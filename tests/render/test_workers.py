@@ -127,7 +127,7 @@ def test_a_dead_worker_is_an_error_that_names_the_frame_and_leaves_nobody(stage)
 
 
 def test_a_fault_in_a_worker_is_told_with_its_traceback(stage, monkeypatch):
-    def fail(*given):
+    def fail(*_, **__):
         raise ZeroDivisionError("no such thing")
 
     monkeypatch.setattr(workplace, "draw_batch", fail)

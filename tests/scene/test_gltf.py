@@ -14,7 +14,7 @@ from quiltcli.scene.bake import bake, reposed
 from quiltcli.scene.importers.asset import read_asset
 from quiltcli.scene.importers.gltf import Playing, gltf_parts, pose
 from quiltcli.scene.importers.part import placed
-from quiltcli.scene.lights import Directional, Point
+from quiltcli.scene.lights import Directional, Point, Spot
 from quiltcli.scene.movers import Mover
 from tests.helpers.gltf_files import SQUARE, GltfFile, one_square
 
@@ -135,12 +135,19 @@ def test_lights_of_the_file_beside_others_and_by_a_factor(tmp_path):
     assert [light.color.tolist() for light in scene.lights] == [[1, 1, 1], [50, 50, 50]]
 
 
-def test_spots_and_ranges_are_told(tmp_path):
-    scene = scene_of(lit({**SUN, "range": 3}, SPOT), tmp_path, "}\nlights: file\n")
-    assert scene.notices == (
-        "m: 1 spot light of the file left out",
-        "m: the range of 1 light is not kept to",
-    )
+def test_spots_ranges_and_shadows_of_the_file(tmp_path):
+    scene = scene_of(lit({**SUN, "range": 3}, {**LAMP, "range": 4}, SPOT), tmp_path, "}\nlights: file\n")
+    sun, lamp, spot = scene.lights
+    assert scene.notices == ()
+    assert (lamp.reach, spot.reach) == (4, np.inf)
+    assert isinstance(spot, Spot)
+    assert spot.direction == pytest.approx(np.array([0, 0, -1]))
+    assert (spot.inner, spot.outer) == pytest.approx((1, np.cos(np.pi / 4)))
+    assert not any(light.shadows for light in scene.lights)
+    text = "}\nlights:\n- {type: file, shadows: true}\n- {type: point, position: [0, 0, 0]}\n"
+    scene = scene_of(lit(SUN, LAMP, SPOT), tmp_path, text)
+    assert [light.shadows for light in scene.lights] == [False, True, True, True]
+    del sun
 
 
 def test_a_file_without_lamps_is_lit_by_the_headlight(tmp_path):

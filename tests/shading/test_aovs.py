@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from quiltcli.channels import CHANNELS, empty_buffers, exr_channels
+from quiltcli.projection.gaze import Gaze
+from quiltcli.projection.planar import QuiltRays
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import SOURCES, canonical_depth, fill
 from quiltcli.viewer.viewer import Viewer
@@ -20,7 +22,8 @@ SCENE = wall(lights(ambient=(1, 0.5, 0.25)))
 
 def filled(name, viewer=VIEWER, seen=STRAIGHT, scene=SCENE, pixels=2):
     buffers = empty_buffers([name], pixels)
-    fill(buffers, [name], viewer, Shaded(scene, viewer.eye, seen))
+    rays = QuiltRays(viewer.eye, np.ones(1, bool), np.eye(3)[None], np.eye(3)[None])
+    fill(buffers, [name], Gaze(viewer, rays), Shaded(scene, viewer.eye, seen))
     return buffers
 
 

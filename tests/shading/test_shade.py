@@ -11,7 +11,6 @@ import pytest
 from quiltcli.geometry import normalized
 from quiltcli.scene import Materials
 from quiltcli.scene.lights import HEADLIGHT
-from quiltcli.shading import lights as arriving
 from quiltcli.shading import shade as shading
 from quiltcli.shading.brdf import LEAST_ROUGHNESS
 from quiltcli.shading.materials import albedo_at
@@ -133,12 +132,15 @@ def test_metal_reflects_though_it_is_called_matte():
     np.testing.assert_array_equal(glossy, matte)
 
 
+def tables_of(some, others):
+    """Materials of two tables."""
+    pairs = zip(vars(some).values(), vars(others).values(), strict=True)
+    return Materials(*(None if a is None else np.concatenate((a, b)) for a, b in pairs))
+
+
 def test_matte_and_glossy_points_do_not_change_each_other():
     scene = wall(lights([[0.1, -0.4, -1]], [[3, 3, 3]]))
-    two = Materials(
-        *(np.concatenate(pair) for pair in zip(vars(materials(specular=0.0)).values(),
-          vars(materials()).values(), strict=True))
-    )  # fmt: skip
+    two = tables_of(materials(specular=0.0), materials())
     scene = replace(
         scene, triangles=np.repeat(scene.triangles, 2, 0), flat=np.zeros(2, bool),
         material=np.array([0, 1], np.int32), materials=two,
@@ -200,10 +202,7 @@ def test_white_furnace_returns_no_more_than_it_gets(metallic, roughness, slope):
 def test_bytes_do_not_depend_on_what_is_shaded_together():
     rng = np.random.default_rng(3)
     scene = wall(lights([[0.1, -1, -0.3]], [[3, 3, 3]], [[1, 1, 1]], [[2, 2, 2]], headlight=True))
-    two = Materials(
-        *(np.concatenate(pair) for pair in zip(vars(scene.materials).values(),
-          vars(materials(color=(1, 0, 0), metallic=1.0)).values(), strict=True))
-    )  # fmt: skip
+    two = tables_of(scene.materials, materials(color=(1, 0, 0), metallic=1.0))
     scene = replace(
         scene, triangles=np.repeat(scene.triangles, 2, 0), flat=np.zeros(2, bool),
         material=np.array([0, 1], np.int32), materials=two,
@@ -277,13 +276,3 @@ def test_each_lamp_adds_to_the_part_it_belongs_to():
     assert diffuse[:, 0] == pytest.approx([2 * 0.96 / math.pi] * 3, rel=1e-6)
     assert specular[:, 0] == pytest.approx([2 * 0.04 / (4 * math.pi)] * 3, rel=1e-6)
     assert not emission.any()
-
-
-def test_what_hides_a_lamp_takes_its_light_away_and_no_others(monkeypatch):
-    sun, lamp = lights([[0, 0, -1]], [[2, 2, 2]]), lights(point=[[0, 0, 1]], power=[[3, 3, 3]])
-    half = np.float32([[0.5]])
-    monkeypatch.setattr(arriving, "occlusion", lambda light, _: half if light.kind == "point" else None)
-    both, alone = (shade(wall(lamps), EYE, STRAIGHT) for lamps in (sun + lamp, sun))
-    monkeypatch.undo()
-    expected = alone + shade(wall(lamp), EYE, STRAIGHT) / 2
-    np.testing.assert_allclose(both, expected, rtol=1e-6)

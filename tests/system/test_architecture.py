@@ -12,9 +12,9 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "quiltcli"
 ORDER = (
-    *("ending", "errors", "geometry", "channels", "formats", "job", "display", "scene", "viewer", "layout"),
-    *("projection", "visibility", "shading", "halftone", "images", "render", "calibration", "analysis"),
-    *("exchange", "api", "cli", "__main__"),
+    *("ending", "errors", "geometry", "channels", "formats", "job", "charts", "display", "scene", "viewer"),
+    *("layout", "projection", "visibility", "shading", "halftone", "lightfield", "images", "ring", "render"),
+    *("calibration", "analysis", "exchange", "api", "cli", "__main__"),
 )
 LIGHT = {"quiltcli.ending", "quiltcli.errors", "quiltcli"}
 STANDARD = {

@@ -59,6 +59,22 @@ def test_what_cannot_do_without_says_so(command: list[str], tmp_path: Path) -> N
     assert not list(tmp_path.rglob("*.exr"))
 
 
+@pytest.mark.parametrize("command", ["render", "check"])
+def test_shadows_need_it_and_can_be_left_out(command: str, tmp_path: Path) -> None:
+    write_tiny_job(tmp_path)
+    replaced(tmp_path, "scene.yaml", "color: [3, 3, 3]}", "color: [3, 3, 3], shadows: true}")
+    done = quilt(tmp_path, command, "job.yaml")
+    assert done.returncode in (1, 2)
+    assert (
+        "rays cast with Embree (render.shadows: false draws none), but embreex is not"
+        in done.stderr + done.stdout
+    )
+    assert not list(tmp_path.rglob("*.exr"))
+    if command == "render":
+        done = quilt(tmp_path, "render", "job.yaml", "--set", "render.shadows=false", "-f", "1")
+        assert done.returncode == 0, done.stderr
+
+
 def test_everything_else_runs(tmp_path: Path) -> None:
     write_tiny_job(tmp_path)
     replaced(tmp_path, "job.yaml", "frames: 1-4", "frames: 1")

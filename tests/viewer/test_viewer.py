@@ -194,7 +194,7 @@ def test_csv_is_read_again_when_it_changes(tmp_path: Path) -> None:
     [
         ("", "F: holds no rows (expected frame,x,y,z)"),
         ("frame,x,y,z\n", "F: holds no rows (expected frame,x,y,z)"),
-        ("1 2 3 4\n", "F:1:1: expected 4, 7 or 10 columns, got 1 (separate the columns by commas)"),
+        ("1|2|3|4\n", "F:1:1: expected 4, 7 or 10 columns, got 1 (separate the columns by commas)"),
         ("1,2,3\n", "F:1:1: expected 4, 7 or 10 columns, got 3"),
         ("1\n", "F:1:1: expected 4, 7 or 10 columns, got 1 (separate the columns by commas)"),
         ("1,0,0,0\n2,0,0\n", "F:2:1: expected 4 columns, got 3"),

@@ -39,6 +39,7 @@ def _yaml_info(kind: str, path: Path) -> Info:
     from quiltcli.analysis.info.displays import display_info
     from quiltcli.analysis.info.jobs import job_info
     from quiltcli.analysis.info.layouts import layout_info
+    from quiltcli.analysis.info.rings import calibration_info, lightfield_info
     from quiltcli.analysis.info.scenes import scene_info
 
     tell = {
@@ -46,5 +47,7 @@ def _yaml_info(kind: str, path: Path) -> Info:
         "quilt_layout": layout_info,
         "quilt_scene": scene_info,
         "quilt_job": job_info,
+        "quilt_lightfield": lightfield_info,
+        "quilt_calibration": calibration_info,
     }
     return tell[kind](path)

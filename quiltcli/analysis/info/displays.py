@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, number, size, spread
-from quiltcli.display import Facets, load_display, pitch_mm, shared_edges
+from quiltcli.charts.measure import measure
+from quiltcli.display import Facets, load_display, pitch_mm, pitch_of, shared_edges
 from quiltcli.formats.mesh.polygons import area_vectors
-from quiltcli.geometry import FloatArray, IntArray, dot
-from quiltcli.job import DisplayFile, load_display_file
+from quiltcli.geometry import FloatArray, IntArray, dot, segments
+from quiltcli.job import DisplayFile
+from quiltcli.job.load import load_any_display
 
 _POLYGONS = {3: "triangle", 4: "quadrilateral", 5: "pentagon", 6: "hexagon", 8: "octagon"}
 
@@ -22,20 +26,25 @@ def display_info(path: Path) -> Info:
     Raises:
         JobError, MeshError, DisplayError: the display cannot be built.
     """
-    spec = load_display_file(path)
+    spec = load_any_display(path)
+    if not isinstance(spec, DisplayFile):
+        from quiltcli.analysis.info.mirrors import mirror_info
+
+        return mirror_info(path)
     facets = load_display(spec)
     table = _facet_table(facets)
     data = _display_data(spec, facets) | {"facet_table": table}
     lit = {"front": "front (walked around)", "back": "back (seen from inside)", "both": "both sides"}
     low, high = data["pitch_mm"]
     lines = [
-        ("mesh", data["mesh"]) if spec.panels is None else ("panels", f"{len(spec.panels):,}"),
+        *_sources(spec),
         ("facets", _facets_text(data)),
         ("lit side", lit[spec.viewing_side]),
         ("area", f"{number(data['area_m2'])} m²"),
         ("pixels", f"{data['pixels']:,}"),
-        ("pitch", spread(low, high, "mm")),
+        *([] if spec.projection else [("pitch", spread(low, high, "mm"))]),
         ("bounds", bounds_text(data["bounds"])),
+        *(_surface_line(found) for found in data.get("surfaces", ())),
         ("shared edges", f"{data['shared_edges']:,}"),
         ("geometry", facets.sha256),
     ]
@@ -43,7 +52,70 @@ def display_info(path: Path) -> Info:
     return Info("display", data, lines, columns, [_row(entry) for entry in table])
 
 
+def _surface_line(found: dict[str, Any]) -> tuple[str, str]:
+    """A curved facet in words."""
+    radius = found["least_radius_m"]
+    bent = "flat" if radius is None else f"least radius {number(radius)} m"
+    low, high = found["pitch_mm"]
+    words = f"{found['kind']}, {number(found['area_m2'])} m², pitch {spread(low, high, 'mm')}, {bent}"
+    return f"facet {found['facet']}", words + (", closes left to right" if found["wraps"] else "")
+
+
+def _sources(spec: DisplayFile) -> Iterator[tuple[str, str]]:
+    """What the display is made of."""
+    if spec.mesh is not None:
+        yield "mesh", str(spec.mesh)
+    if spec.panels is not None:
+        yield "panels", f"{len(spec.panels):,}"
+    if spec.surfaces is not None:
+        yield "surfaces", ", ".join(surface.kind for surface in spec.surfaces)
+    if spec.projection is not None:
+        projection = spec.projection
+        yield "projection", f"{projection.kind}, which follows the {projection.follows}"
+
+
 def _display_data(spec: DisplayFile, facets: Facets) -> dict[str, Any]:
+    """The display for programs; curved facets count by their own area and pitch."""
+    data = _flat_data(spec, facets)
+    surfaces = _surfaces(facets)
+    if not facets.charts:
+        return data
+    flat = np.flatnonzero(facets.enabled & ~facets.curved)
+    area = areas(facets.corners, facets.corner_start)[flat].sum() + sum(s["area_m2"] for s in surfaces)
+    row, _ = segments(facets.corner_start)
+    points = [facets.corners[np.isin(row, flat)]]
+    points += [np.array((found["bounds"]["min"], found["bounds"]["max"])) for found in surfaces]
+    pitch = [*pitch_of(facets.du[flat], facets.dv[flat])] if flat.size else []
+    pitch += [step for found in surfaces for step in found["pitch_mm"]]
+    everything = np.concatenate(points)
+    told = {"area_m2": float(area), "surfaces": surfaces}
+    if len(everything):
+        told |= {"pitch_mm": [min(pitch), max(pitch)], "bounds": bounds(everything)}
+    return data | told
+
+
+def _surfaces(facets: Facets) -> list[dict[str, Any]]:
+    """The curved facets that stand in the world."""
+    found = []
+    for facet, chart in enumerate(facets.charts):
+        if chart is None or not chart.stands:
+            continue
+        figures = measure(chart)
+        found.append(
+            {
+                "facet": facet + 1,
+                "kind": json.loads(chart.record)["kind"],
+                "area_m2": figures.area,
+                "pitch_mm": [1000 * step for step in figures.pitch],
+                "least_radius_m": figures.radius if np.isfinite(figures.radius) else None,
+                "bounds": bounds(np.stack((figures.low, figures.high))),
+                "wraps": chart.wraps,
+            }
+        )
+    return found
+
+
+def _flat_data(spec: DisplayFile, facets: Facets) -> dict[str, Any]:
     return {
         "path": facets.path,
         "mesh": None if spec.mesh is None else str(spec.mesh),

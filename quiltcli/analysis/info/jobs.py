@@ -26,6 +26,10 @@ def job_info(path: Path) -> Info:
         JobError, ViewerError, MeshError, DisplayError: the job, its path or its display is wrong.
     """
     job = load_job(path)
+    if job.ring is not None:
+        from quiltcli.analysis.info.mirrors import ring_job_info
+
+        return ring_job_info(path, job)
     viewers = viewers_of(job, job.frames)
     table = _frame_table(viewers, load_display(load_display_file(job.display)))
     eyes = np.stack([viewer.eye for viewer in viewers])
@@ -42,7 +46,7 @@ def job_info(path: Path) -> Info:
         "frames": table,
     }
     lines = [
-        *_value_lines(values),
+        *value_lines(values),
         ("length", f"{counted(len(job.frames), 'frame')}, {number(data['seconds'])} s"),
         ("eye's way", f"{number(length)} m"),
         ("eye's bounds", bounds_text(data["eye_bounds"])),
@@ -79,12 +83,12 @@ def _row(entry: dict[str, Any]) -> list[str]:
     return [str(entry["frame"]), vector(entry["eye"]), vector(entry["look"]), str(entry["lit_facets"])]
 
 
-def _value_lines(values: Any, above: str = "") -> Iterator[tuple[str, str]]:
+def value_lines(values: Any, above: str = "") -> Iterator[tuple[str, str]]:
     """Dotted key and value of everything the job says, keyframes counted."""
     for key, value in values.items():
         name = f"{above}.{key}" if above else key
         if isinstance(value, dict):
-            yield from _value_lines(value, name)
+            yield from value_lines(value, name)
         elif key == "keyframes":
             yield name, counted(len(value), "keyframe")
         elif above or key not in ("quilt_job",):

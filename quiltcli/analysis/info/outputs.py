@@ -12,6 +12,7 @@ from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.capacity import bytes_text
 from quiltcli.formats.inputs import is_regular, read_input
 from quiltcli.images.names import names_in
+from quiltcli.images.turns import is_ring_output
 from quiltcli.job.frames import format_frames
 
 
@@ -26,6 +27,10 @@ def output_info(path: Path) -> Info:
             "is a directory without a render in it (expected a file, or one with job.yaml and report.json)"
         )
         raise OutputError(Problem(words, file=str(path)))
+    if is_ring_output(path):
+        from quiltcli.analysis.info.mirrors import ring_output_info
+
+        return ring_output_info(path)
     entries = _entries(path / "report.json")
     found = list(names_in(path).found(path))
     names, images = [name for name, _ in found], [file for _, file in found]

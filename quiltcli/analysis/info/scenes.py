@@ -152,4 +152,4 @@ def _row(number_: int, entry: dict[str, Any]) -> list[str]:
 
 def _light_counts(lights: Sequence[Light]) -> dict[str, int]:
     """How many lights of each kind; headlight last."""
-    return {kind.kind: sum(isinstance(light, kind) for light in lights) for kind in KINDS}
+    return {kind.kind: sum(type(light) is kind for light in lights) for kind in KINDS}

@@ -31,7 +31,7 @@ from quiltcli.analysis.verify.frame import make_trial
 from quiltcli.analysis.verify.images import Images
 from quiltcli.analysis.verify.pixels import Trial
 from quiltcli.analysis.verify.seams import SeamPoints, check_seams, seam_points
-from quiltcli.display import shared_edges
+from quiltcli.display import demand_flat, shared_edges
 from quiltcli.errors import JobError
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
 from quiltcli.images.preview import Bytes
@@ -122,6 +122,7 @@ def compare(job: JobFile, options: CompareOptions | None = None) -> Study:
     frame = job.frames[0] if options.frame is None else options.frame
     viewers_of(job, [frame])
     stage = set_stage(with_variant(job, REFERENCE)).at(frame)
+    demand_flat(stage.facets, "quilt compare")
     viewers = stage.views([frame])[0].viewers
     variants = (REFERENCE, *(v for v in dict.fromkeys(options.variants) if v != REFERENCE))
     threads = options.threads or default_threads()

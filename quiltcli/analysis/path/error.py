@@ -52,7 +52,7 @@ def picture_error(facets: Facets, viewers: Sequence[Viewer], noise: float) -> Pi
     linear = facet_from_world(facets.origin, facets.du, facets.dv)[:, :2, :3]
     total, count, worst = 0.0, 0, (-1.0, 0, 0)
     for viewer in viewers[:: max(len(viewers) // _MOST_VIEWERS, 1)]:
-        lit = np.flatnonzero(their_lit_facets(facets, viewer))
+        lit = np.flatnonzero(their_lit_facets(facets, viewer) & ~facets.curved)
         if not lit.size:
             continue
         squares = _squares(linear[lit], facets.normal[lit], middles[lit] - viewer.eye)

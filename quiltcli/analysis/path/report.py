@@ -31,6 +31,9 @@ def lines(study: PathStudy) -> Iterator[tuple[str, str]]:
         yield "doubled", f"{counted(cleaned.doubled, 'sample')} with the stamp of another, merged"
     yield "gaps", _gaps_text(cleaned.filled, [gap for gap in cleaned.gaps if not gap.is_jump])
     yield "jumps", _jumps_text(len(cleaned.jumps), len(cleaned.spikes))
+    if cleaned.turns.size:
+        seconds = ", ".join(f"{time:.3f}" for time in cleaned.turns[:5]) + " …" * (cleaned.turns.size > 5)
+        yield "turns", f"{counted(cleaned.turns.size, 'turn')} faster than any head, at second {seconds}"
     if study.speed.size:
         mean, most = float(study.speed.mean()), float(study.speed.max())
         yield "speed", f"{mean:.3g} m/s on average, {most:.3g} m/s at most"
@@ -124,6 +127,7 @@ def as_data(study: PathStudy) -> dict[str, Any]:
         "filled": [[gap.first, gap.last] for gap in cleaned.filled],
         "gaps": [[gap.first, gap.last] for gap in cleaned.gaps if not gap.is_jump],
         "jumps": [[gap.first, gap.last] for gap in cleaned.jumps],
+        "turns": cleaned.turns.tolist(),
         "speed": {"mean": float(study.speed.mean()), "max": float(study.speed.max())}
         if study.speed.size
         else None,

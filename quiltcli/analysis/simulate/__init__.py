@@ -19,20 +19,21 @@ from quiltcli.analysis.simulate.picture import (
     direct_light,
     displayed_light,
     outlined,
-    visible_facets,
+    visible_triangles,
     with_channels,
 )
 from quiltcli.analysis.simulate.reference import resampled_light
+from quiltcli.analysis.simulate.skin import skin_of
 from quiltcli.analysis.simulate.thirdperson import third_person_camera, third_person_light
-from quiltcli.display import Facets
 from quiltcli.errors import JobError
-from quiltcli.geometry import Float32Array
+from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.images.preview import block_means
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.projection.camera import aimed, camera_display, frame_display
 from quiltcli.render.crew import default_threads
 from quiltcli.render.notices import stage_warnings
 from quiltcli.render.setup import Stage, set_stage
+from quiltcli.render.unseen import unseen_in
 from quiltcli.viewer.view import views_of
 from quiltcli.viewer.viewer import Viewer
 
@@ -124,10 +125,14 @@ def simulate(
     stage = set_stage(with_channels(job, ("rgba",)))
     for notice in (*stage.scene.notices, *stage_warnings(stage, frames)):
         say(notice)
+    if job.render.shutter and options.compare:
+        say("the shutter is open: the images have motion blur, the direct picture beside them has none")
     threads = options.threads or default_threads()
     views = [view for view in stage.views(frames) if options.eye in ("", view.eye)]
     if not views:
         raise JobError(f"--eye {options.eye}: the job has one eye (viewer.stereo gives it two)")
+    for notice in unseen_in(stage, views):
+        say(notice)
     # Frame by frame and viewer by viewer, the left eye before the right.
     seen = [(view, number) for view in views for number in range(len(view.viewers))]
     for view, number in sorted(seen, key=lambda item: (item[0].frame, item[1])):
@@ -141,12 +146,14 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     """One picture of a display with its images on, with its figures where it is taken from the eye."""
     if options.third_person:
         return _third_person(stage, viewer, shown, options)
-    camera, fov = _camera(viewer, stage.facets, options)
+    skin = skin_of(stage.facets, viewer)
+    camera, fov = _camera(viewer, skin.vertices, options)
     width, height = (options.samples * side for side in options.size)
     through = camera_display(camera, width, height, fov)
     threads = options.threads or default_threads()
-    facet = visible_facets(stage, camera, through, threads)
-    light, lit = displayed_light(shown, camera, through, facet, options.filter)
+    triangle = visible_triangles(stage, camera, through, threads, skin)
+    facet = skin.facet_of(triangle)
+    light, lit = displayed_light(shown, camera, through, facet, options.filter, skin, triangle)
     picture = plain = block_means(_image(light, width), options.samples)
     if options.edges:
         picture = block_means(_image(outlined(light, facet, width), width), options.samples)
@@ -156,7 +163,7 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     on_lit = np.where(lit, facet, -1).reshape(height, width).astype(np.int32)
     covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
     coarse = None
-    if options.resampled:
+    if options.resampled and not stage.facets.charts:
         coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads, options.filter)
     once = None if coarse is None else block_means(_image(coarse, width), options.samples)
     comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples), once)
@@ -187,8 +194,8 @@ def _image(light: Float32Array, width: int) -> Float32Array:
     return light.reshape(3, -1, width).transpose(1, 2, 0)
 
 
-def _camera(viewer: Viewer, facets: Facets, options: PictureOptions) -> tuple[Viewer, float]:
-    """The picture's camera and its field of view, degrees from top to bottom."""
+def _camera(viewer: Viewer, points: FloatArray, options: PictureOptions) -> tuple[Viewer, float]:
+    """The picture's camera and its field of view, degrees from top to bottom, before points of a display."""
     camera = viewer
     if options.place is not None:
         camera = replace(
@@ -197,5 +204,5 @@ def _camera(viewer: Viewer, facets: Facets, options: PictureOptions) -> tuple[Vi
     if options.look_at is not None:
         camera = aimed(camera, np.asarray(options.look_at, dtype=np.float64) - camera.eye)
     aspect = options.size[0] / options.size[1]
-    framed, fov = frame_display(camera, facets.corners, aspect, turn=options.look_at is None)
+    framed, fov = frame_display(camera, points, aspect, turn=options.look_at is None)
     return (framed, fov) if options.fov is None else (framed, options.fov)

@@ -140,6 +140,8 @@ def _around(image: Int32Array, reduce: np.ufunc) -> Int32Array:
 
 def figures(comparison: Comparison) -> list[tuple[str, str]]:
     """The figures as rows of a label and a value."""
+    if not comparison.share:
+        return [("view on lit facets", "none: there is nothing to compare")]
     rows = [
         ("view on lit facets", f"{100 * comparison.share:.2f} %"),
         ("error, mean", f"{comparison.mean:.3e}"),

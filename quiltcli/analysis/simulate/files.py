@@ -106,16 +106,21 @@ def _check(frames: Sequence[int], options: PictureOptions, pictures: Pictures) -
     if pictures.video is not None:
         coding_of(pictures.video)
     names = [path for path in (pictures.picture, pictures.direct, pictures.heat_map) if path is not None]
-    for path in names:
-        if path.suffix.lower() != ".png":
-            raise OutputError(Problem("a picture's name must end in .png", file=str(path)))
-        if len(frames) > 1 and not _NUMBER.search(path.name):
-            wrong = f"is one name for {len(frames)} frames (put #### where the frame number goes)"
-            raise OutputError(Problem(wrong, file=str(path)))
+    check_names(names, len(frames))
     if names != [pictures.picture] * len(names) and (
         options.place is not None or options.third_person or not options.compare
     ):
         raise JobError("--direct and --heat-map need a comparison, which there is only from the viewer's eye")
+
+
+def check_names(names: Sequence[Path], frames: int) -> None:
+    """Raise OutputError where a picture's name is none, or one for several frames."""
+    for path in names:
+        if path.suffix.lower() != ".png":
+            raise OutputError(Problem("a picture's name must end in .png", file=str(path)))
+        if frames > 1 and not _NUMBER.search(path.name):
+            wrong = f"is one name for {frames} frames (put #### where the frame number goes)"
+            raise OutputError(Problem(wrong, file=str(path)))
 
 
 def numbered(path: Path, frame: int, eye: str = "") -> Path:

@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.analysis.simulate.lookup import Shown
-from quiltcli.formats.exr.image import read_exr
 from quiltcli.geometry import BoolArray, OwnerArray
 from quiltcli.images.facets import page_of, quilt_buffers
+from quiltcli.images.layers import read_view
 from quiltcli.images.metadata import is_complete
 from quiltcli.images.window import whole_frame
 from quiltcli.layout import pixel_owners
 from quiltcli.render.buffers import Buffers, new_buffers
-from quiltcli.render.methods import draw_view
+from quiltcli.render.methods import draw_moment
+from quiltcli.render.moments import moment
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import View
@@ -48,7 +49,7 @@ def shown_images(
         owners = pixel_owners(stage.layout)  # a facet's image ends at its polygon
     else:
         buffers, source = new_buffers(stage), "drawn for this picture"
-        draw_view(stage, view, buffers, threads)
+        draw_moment(moment(stage, view), buffers, threads)
     return Shown(stage.facets, stage.layout, lit, buffers, owners, viewer.eye), source
 
 
@@ -59,7 +60,7 @@ def _quilts(stage: Stage, view: View, folder: Path, job_sha: str) -> Buffers | N
         return None
     buffers = {name: np.zeros(stage.owners.size, dtype=np.float16) for name in "RGB"}
     for page, path in enumerate(paths):
-        channels = whole_frame(read_exr(path, view.part))
+        channels = whole_frame(read_view(path, view.part))
         if any(name not in channels for name in "RGB"):
             return None
         for name, flat in buffers.items():
@@ -75,7 +76,7 @@ def _facets(stage: Stage, lit: BoolArray, view: View, folder: Path, job_sha: str
         return None
     images = {}
     for row, path in paths.items():
-        channels = whole_frame(read_exr(path, view.part))
+        channels = whole_frame(read_view(path, view.part))
         if any(name not in channels for name in "RGB"):
             return None
         images[row] = {name: channels[name] for name in "RGB"}

@@ -24,6 +24,7 @@ from quiltcli.geometry import (
     segments,
 )
 from quiltcli.layout import Layout
+from quiltcli.projection.curved import inverse_affine
 from quiltcli.projection.planar import QuiltRays, quilt_rays
 from quiltcli.render.buffers import Buffers
 
@@ -66,9 +67,16 @@ class Shown:
         return result
 
     @cached_property
+    def wrapping(self) -> tuple[int, ...]:
+        """Facets whose left and right edges are the same line, where filters go on at the other end."""
+        charts = enumerate(self.facets.charts)
+        return tuple(row for row, chart in charts if chart is not None and chart.wraps and self.lit[row])
+
+    @cached_property
     def rays(self) -> QuiltRays:
         """The viewer's rays through the quilt."""
-        return quilt_rays(self.layout, self.lit, self.eye)
+        flat = self.lit & ~self.facets.curved if self.facets.charts else self.lit
+        return quilt_rays(self.layout, flat, self.eye)
 
 
 def quilt_places(
@@ -86,7 +94,8 @@ def quilt_places(
     Returns:
         (2, P) continuous pixels.
     """
-    matrices = quilt_rays(shown.layout, lit, eye).quilt_from_eye
+    flat = lit & ~shown.facets.curved if shown.facets.charts else lit
+    matrices = quilt_rays(shown.layout, flat, eye).quilt_from_eye
     result = np.empty((2, facet.size))
     for start in range(0, facet.size, _BLOCK):
         part = slice(start, start + _BLOCK)
@@ -94,6 +103,8 @@ def quilt_places(
         x, y, w = (
             m[i, 0] * rays[0, part] + m[i, 1] * rays[1, part] + m[i, 2] * rays[2, part] for i in range(3)
         )
+        # Curved facets have no matrix: whoever asks about them asks their charts.
+        w = np.where(w == 0, 1.0, w)
         result[0, part], result[1, part] = x / w, y / w
     return result
 
@@ -224,10 +235,23 @@ def _address(shown: Shown, facet: Int32Array, x: IntArray, y: IntArray) -> tuple
     """Flat addresses (P,) of page pixels, and whether they hold the facet's image; 0 where off the page."""
     page = shown.layout.page[facet]
     width, height = shown.layout.pages[page].T.astype(np.int64)
+    for row in shown.wrapping:
+        x, y = _wrapped(shown.layout, row, x, y, np.flatnonzero(facet == row))
     on = (x >= 0) & (x < width) & (y >= 0) & (y < height)
     address = np.where(on, shown.layout.page_offset[page] + y * width + x, 0)
     mine: BoolArray = on & (np.abs(shown.owners[address]) == shown.layout.facet[facet])
     return address, mine
+
+
+def _wrapped(layout: Layout, row: int, x: IntArray, y: IntArray, mine: IntArray) -> tuple[IntArray, IntArray]:
+    """Page pixels (P,), those `mine` (n,) of a facet that closes left to right taken to its other edge."""
+    matrix = layout.quilt_from_facet[row]
+    i, j = inverse_affine(matrix) @ np.stack((x[mine] + 0.5, y[mine] + 0.5, np.ones(mine.size)))
+    i = np.mod(i, int(layout.size[row, 0]))
+    there = np.floor(matrix @ np.stack((i, j, np.ones(mine.size)))).astype(np.int64)
+    x, y = x.copy(), y.copy()
+    x[mine], y[mine] = there
+    return x, y
 
 
 FILTERS: dict[str, Callable[[Shown, Int32Array, FloatArray], Float32Array]] = {

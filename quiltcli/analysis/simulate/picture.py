@@ -8,7 +8,8 @@ from typing import TypeAlias
 import numpy as np
 
 from quiltcli.analysis.simulate.lookup import Shown, look_up, quilt_places
-from quiltcli.display import Facets, lit_facets, triangulate
+from quiltcli.analysis.simulate.skin import Skin, skin_of
+from quiltcli.display import Facets, lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, dot, normalized
 from quiltcli.job import JobFile
 from quiltcli.layout import Layout
@@ -16,7 +17,8 @@ from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.setup import Stage, stage_of
-from quiltcli.scene import Materials, Scene
+from quiltcli.scene import Scene
+from quiltcli.scene.bare import bare_scene
 from quiltcli.viewer.viewer import Viewer
 
 Camera: TypeAlias = tuple[Facets, Layout]
@@ -40,10 +42,13 @@ def exact(job: JobFile, **render: object) -> JobFile:
 
 def visible_facets(stage: Stage, camera: Viewer, through: Camera, threads: int) -> Int32Array:
     """The facet (P,) that every ray of the picture meets first, from either side; −1 for none."""
-    triangles, facet = triangulate(stage.facets)
-    met, _ = first_triangles(stage, camera, through, mesh_scene(stage.facets.corners, triangles), threads)
-    result: Int32Array = np.concatenate((facet, [-1])).astype(np.int32)[met]
-    return result
+    skin = skin_of(stage.facets, camera)
+    return skin.facet_of(visible_triangles(stage, camera, through, threads, skin))
+
+
+def visible_triangles(stage: Stage, camera: Viewer, through: Camera, threads: int, skin: Skin) -> Int32Array:
+    """The triangle (P,) of a display that every ray meets first, from either side; −1 for none."""
+    return first_triangles(stage, camera, through, bare_scene(skin.vertices, skin.triangles), threads)[0]
 
 
 def first_triangles(
@@ -65,37 +70,27 @@ def camera_stage(job: JobFile, through: Camera, scene: Scene) -> Stage:
     return stage_of(job.model_copy(update={"render": exact}), *through, scene, bleed=0)
 
 
-def mesh_scene(vertices: FloatArray, triangles: Int32Array) -> Scene:
-    """A scene of bare triangles: what they look like is not asked."""
-    return Scene(
-        vertices=vertices,
-        triangles=triangles,
-        normals=np.zeros(vertices.shape, dtype=np.float32),
-        colors=np.ones(vertices.shape, dtype=np.float32),
-        flat=np.ones(len(triangles), dtype=np.bool_),
-        object=np.zeros(len(triangles), dtype=np.int32),
-        material=np.zeros(len(triangles), dtype=np.int32),
-        objects=("display",),
-        materials=Materials(
-            np.ones((1, 3), np.float32),
-            np.zeros(1, np.float32),
-            np.ones(1, np.float32),
-            np.zeros((1, 3), np.float32),
-            np.ones(1, dtype=np.bool_),
-            np.ones(1, np.float32),
-        ),
-        lights=(),
-        background=np.zeros(3, dtype=np.float32),
-        notices=(),
-    )
-
-
 def displayed_light(
-    shown: Shown, camera: Viewer, through: Camera, facet: Int32Array, how: str
+    shown: Shown,
+    camera: Viewer,
+    through: Camera,
+    facet: Int32Array,
+    how: str,
+    skin: Skin | None = None,
+    triangle: Int32Array | None = None,
 ) -> tuple[Float32Array, BoolArray]:
     """What the camera sees of the display: (3, P) linear light, and (P,) where it is an image.
 
     Back sides, and facets that are dark for this viewer, are grey, the darker the more they turn away.
+
+    Args:
+        shown: the images.
+        camera: the camera.
+        through: its display of one facet.
+        facet: (P,) facet that each ray meets, −1 for none.
+        how: a filter of `lookup.FILTERS`.
+        skin: the display's triangles; curved facets need them.
+        triangle: (P,) which of them each ray meets.
     """
     light = np.repeat(_SURROUND[:, None], facet.size, axis=1)
     facing = lit_facets(shown.facets, camera.eye) & shown.lit
@@ -105,10 +100,35 @@ def displayed_light(
     light[:, met] = (_DARK * (0.25 + 0.75 * grey)).astype(np.float32)
     bright = facing[facet[met]]
     place = quilt_places(shown, facet[met[bright]], rays[:, bright], camera.eye, facing)
+    if shown.facets.charts and skin is not None and triangle is not None:
+        # A curved facet's places are where rays meet it, and its pixels are lit one by one.
+        on = np.flatnonzero(bright)
+        bent = np.flatnonzero(shown.facets.curved[facet[met[on]]])
+        found = skin.curved_places(triangle[met[on[bent]]], rays[:, on[bent]], camera.eye)
+        place[:, bent], shows = curved_pixels(shown, skin, facet[met[on[bent]]], found, camera)
+        bright[on[bent[~shows]]] = False
+        place = place[:, bright[on]]
     light[:, met[bright]] = look_up(shown, facet[met[bright]], place, how)
     lit = np.zeros(facet.size, dtype=np.bool_)
     lit[met[bright]] = True
     return light, lit
+
+
+def curved_pixels(
+    shown: Shown, skin: Skin, facet: Int32Array, place: FloatArray, camera: Viewer
+) -> tuple[FloatArray, BoolArray]:
+    """Page pixels (2, P) of facet pixels of curved facets, and which show an image to viewer and camera."""
+    result, shows = np.zeros(place.shape), np.zeros(facet.size, dtype=np.bool_)
+    for row in np.unique(facet).tolist():
+        mine = np.flatnonzero(facet == row)
+        chart = shown.facets.charts[row]
+        assert chart is not None
+        x, y = place[:, mine]
+        points = chart.points(x, y)
+        shows[mine] = chart.lit(x, y, points, skin.viewer.eye) & chart.lit(x, y, points, camera.eye)
+        matrix = shown.layout.quilt_from_facet[row]
+        result[:, mine] = matrix[:, :1] * x + matrix[:, 1:2] * y + matrix[:, 2:]
+    return result, shows
 
 
 def picture_rays(camera: Viewer, through: Camera, pixel: IntArray) -> FloatArray:

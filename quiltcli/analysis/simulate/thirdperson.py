@@ -1,7 +1,8 @@
 """The display, its viewer and the scene as somebody else sees them.
 
 Eye, rays and display are triangles of one scene and drawn by the program's own rasterizer; what is
-seen of the display is looked up in its images. The scene itself lies over it, solid or as a ghost.
+seen of the display is looked up in its images. Walls seen from behind are glass, or nobody would see into
+a room of them. The scene itself lies over it all, solid or as a ghost.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from quiltcli.analysis.simulate.picture import (
     displayed_light,
     exact,
     first_triangles,
-    mesh_scene,
+    outlined,
     picture_rays,
     with_channels,
 )
-from quiltcli.display import Facets, lit_facets, triangulate
+from quiltcli.analysis.simulate.skin import skin_of
+from quiltcli.display import Facets, lit_facets
 from quiltcli.geometry import (
     BoolArray,
     Float32Array,
@@ -38,6 +40,7 @@ from quiltcli.projection.camera import aimed, frame_display
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.setup import Stage
+from quiltcli.scene.bare import bare_scene
 from quiltcli.viewer.viewer import Viewer
 
 SCENES = ("ghost", "solid", "none")
@@ -46,6 +49,7 @@ RAYS = 8
 
 _EYE, _RAY = (1.0, 0.62, 0.05), (0.95, 0.5, 0.04)
 _ASIDE, _ABOVE = math.radians(55), math.radians(22)
+_GLASS = np.float32(0.3)  # how much of a wall's back shows
 _BEFORE, _BEHIND = np.float32(0.55), np.float32(0.25)  # how much of a ghost shows
 
 
@@ -93,13 +97,19 @@ def _way_aside(viewer: Viewer, facets: Facets) -> FloatArray:
     return np.asarray(ways[int(seen[1] > 1.001 * seen[0])])
 
 
-def outline_points(viewer: Viewer, facets: Facets, lit: BoolArray, most: int = RAYS) -> FloatArray:
+def outline_points(
+    viewer: Viewer, facets: Facets, lit: BoolArray, most: int = RAYS, bent: FloatArray | None = None
+) -> FloatArray:
     """At most so many corners (N, 3) of lit facets on the display's outline as the eye sees it, well apart.
 
-    Around an eye that the display surrounds there is no outline: any corners then.
+    Around an eye that the display surrounds there is no outline: any corners then. Curved facets count by
+    the points of theirs that are given, `bent` (M, 3).
     """
     row, _ = segments(facets.corner_start)
-    corners = np.unique(facets.corners[lit[row]], axis=0)
+    flat = lit & ~facets.curved
+    corners = np.unique(facets.corners[flat[row]], axis=0)
+    if bent is not None:
+        corners = np.concatenate((corners, bent))
     if not len(corners):
         return corners
     way = normalized(corners - viewer.eye)
@@ -107,8 +117,8 @@ def outline_points(viewer: Viewer, facets: Facets, lit: BoolArray, most: int = R
     slope = dot(way, ahead)
     if slope.min() > 0.05:
         side = normalized(cross(ahead, np.eye(3)[int(np.argmin(np.abs(ahead)))]))
-        flat = np.stack((dot(way, side), dot(way, cross(ahead, side))), axis=1) / slope[:, None]
-        outline = hull(flat)
+        seen = np.stack((dot(way, side), dot(way, cross(ahead, side))), axis=1) / slope[:, None]
+        outline = hull(seen)
         corners, way, slope = corners[outline], way[outline], slope[outline]
     chosen = [int(np.argmin(slope))]
     while len(chosen) < min(most, len(corners)):
@@ -178,14 +188,18 @@ def third_person_light(
         scene: a name of `SCENES`.
         threads: batches drawn at a time.
     """
-    triangles, facet_of = triangulate(stage.facets)
-    reach = np.concatenate((stage.facets.corners, viewer.eye[None]))
+    skin = skin_of(stage.facets, viewer)
+    # The backs of flat facets are looked through, like glass.
+    back = ~lit_facets(stage.facets, camera.eye)[skin.facet]
+    rear = np.flatnonzero(back)
+    triangles, facet_of = skin.triangles[~back], skin.facet[~back]
+    reach = np.concatenate((skin.vertices, viewer.eye[None]))
     size = float(np.sqrt(dot(np.ptp(reach, axis=0), np.ptp(reach, axis=0))))
     thick = float(np.linalg.norm(through[0].dv[0])) * float(np.linalg.norm(reach.mean(axis=0) - camera.eye))
-    points = outline_points(viewer, stage.facets, shown.lit)
+    points = outline_points(viewer, stage.facets, shown.lit, bent=skin.lit_points())
     marks = viewer_marks(viewer, points, max(0.018 * size, 6 * thick), max(1.2 * thick, 1.2e-3 * size))
-    corners = stage.facets.corners
-    everything = mesh_scene(
+    corners = skin.vertices
+    everything = bare_scene(
         np.concatenate((corners, marks.vertices)),
         np.concatenate((triangles, marks.triangles + len(corners))).astype(np.int32),
     )
@@ -194,12 +208,27 @@ def third_person_light(
     facet = np.concatenate((facet_of, [-1])).astype(np.int32)[
         np.where((met < 0) | (marked >= 0), len(facet_of), met)
     ]
-    light, _ = displayed_light(shown, camera, through, facet, how)
+    front = np.append(np.flatnonzero(~back), -1)[np.where(facet >= 0, met, -1)]
+    light, _ = displayed_light(shown, camera, through, facet, how, skin, front.astype(np.int32))
     on = np.flatnonzero(marked >= 0)
     light[:, on] = _mark_light(marks, marked[on], picture_rays(camera, through, on))
+    if rear.size:
+        walls = bare_scene(corners, skin.triangles[rear])
+        pane, before = first_triangles(stage, camera, through, walls, threads)
+        panes = np.where(before < depth, np.append(skin.facet[rear], -1)[pane], -1).astype(np.int32)
+        light = _through_glass(shown, camera, through, panes, light)
     if scene != "none":
         light = _with_scene(stage, camera, through, light, depth, threads, solid=scene == "solid")
     return light, facet
+
+
+def _through_glass(
+    shown: Shown, camera: Viewer, through: Camera, facet: Int32Array, light: Float32Array
+) -> Float32Array:
+    """Light (3, P) with the backs of the facets (P,) that stand before it, −1 for none, laid over it."""
+    glass, _ = displayed_light(shown, camera, through, facet, "nearest")
+    mixed = np.where(facet >= 0, light + _GLASS * (glass - light), light).astype(np.float32)
+    return outlined(mixed, facet, int(through[1].pages[0, 0]))
 
 
 def _mark_light(marks: Marks, triangle: Int32Array, rays: FloatArray) -> Float32Array:

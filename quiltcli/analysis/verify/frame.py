@@ -22,14 +22,15 @@ from quiltcli.display import shared_edges
 from quiltcli.errors import JobError, Problem
 from quiltcli.geometry import IntArray
 from quiltcli.job import JobFile
-from quiltcli.projection.planar import quilt_rays
+from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.crew import default_threads
+from quiltcli.render.methods.raycast import target_of
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import View, views_of
 from quiltcli.viewer.viewer import Viewer
-from quiltcli.visibility.rays.embree import aim
 from quiltcli.visibility.rays.exact import Neighbours
+from quiltcli.visibility.rays.pixels import lit_pixels
 
 SAMPLE = 200_000
 _SEAM_POINTS, _ALL_SEAM_POINTS = 16, 4096
@@ -77,7 +78,9 @@ class Verdict:
         """The verdict in a few words."""
         if not self.lit and self.passed:
             return "nothing to verify, no facet is lit"
-        return "within tolerance" if self.passed else "OUT OF TOLERANCE"
+        if not self.passed:
+            return "OUT OF TOLERANCE"
+        return "within tolerance" + ("" if self.inside["covered"] else ", but no pixel shows the scene")
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -189,6 +192,9 @@ def verify_images(
         blocks = sampled_pixels(
             stage.layout, stage.owners, trial.rays.lit, bleed, options.pixels, viewer.frame, also
         )
+    unlit = 0
+    if stage.facets.charts:
+        blocks, unlit = _lit_blocks(trial, blocks)
     inside, bled = _check_blocks(trial, blocks, options.threads or default_threads())
     return Verdict(
         frame=viewer.frame,
@@ -197,10 +203,22 @@ def verify_images(
         lit=int(np.count_nonzero(trial.rays.lit)),
         inside=inside,
         bleed=bled,
-        outside=_shown_outside(stage, everybody or (viewer,), images),
+        outside=_shown_outside(stage, everybody or (viewer,), images) + unlit,
         seams=check_seams(trial, points),
         areas=Areas(display_coverage(stage.facets), stage.scene.coverage),
     )
+
+
+def _lit_blocks(trial: Trial, blocks: Iterator[IntArray]) -> tuple[Iterator[IntArray], int]:
+    """Blocks without the pixels that curved facets do not light, and how many of those show something."""
+    kept, shown = [], 0
+    for block in blocks:
+        owned = block[trial.owners[block] != 0]
+        lit = lit_pixels(owned, trial.layout, trial.owners, trial.rays)
+        shown += int(np.count_nonzero(trial.images.channels["Z"][owned[~lit]] != np.inf))
+        if lit.any():
+            kept.append(owned[lit])
+    return iter(kept), shown
 
 
 def _check_blocks(trial: Trial, blocks: Iterator[IntArray], threads: int) -> tuple[Tally, Tally]:
@@ -216,8 +234,8 @@ def _check_blocks(trial: Trial, blocks: Iterator[IntArray], threads: int) -> tup
 def make_trial(stage: Stage, viewer: Viewer, images: Images) -> Trial:
     """Prepare what the pixels of a frame are verified with."""
     scene = stage.scene
-    rays = quilt_rays(stage.layout, their_lit_facets(stage.facets, viewer), viewer.eye)
-    target = aim(scene.vertices, scene.triangles, viewer, stage.job.render.backface_culling)
+    rays = viewer_rays(stage.layout, stage.facets, their_lit_facets(stage.facets, viewer), viewer)
+    target = target_of(stage, viewer)
     neighbours = Neighbours(scene.vertices, scene.triangles)
     return Trial(stage.layout, stage.owners, rays, target, neighbours, images)
 

@@ -64,7 +64,7 @@ def find_images(stage: Stage, view: View, folder: Path, threads: int, redraw: bo
     if "Z" not in channels:
         return draw_images(stage, view, threads, f" (the quilt in {folder} has no Z)")
     # With several samples a pixel, A is a share of them and Z is still the centre's.
-    alpha = ("rgba",) if stage.job.render.samples == 1 else ()
+    alpha = () if stage.job.render.averages else ("rgba",)
     wanted = [name for name in channels if name in (*_DRAWN, *alpha)]
     buffers = empty_buffers(wanted, stage.owners.size)
     for unused in "RGB":
@@ -77,7 +77,7 @@ def draw_images(stage: Stage, view: View, threads: int, why: str = "") -> Images
     """Draw the depth and triangle of every pixel in memory."""
     job = stage.job
     output = job.output.model_copy(update={"channels": _DRAWN})
-    render = job.render.model_copy(update={"samples": 1})
+    render = job.render.model_copy(update={"samples": 1, "shutter": 0.0})
     plain = replace(stage, job=job.model_copy(update={"output": output, "render": render}))
     buffers = empty_buffers(_DRAWN, stage.owners.size)
     draw_view(plain, view, buffers, threads)

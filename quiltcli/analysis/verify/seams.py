@@ -77,6 +77,8 @@ class SeamPoints:
 def seam_points(trial: Trial, edges: SharedEdges, most: int) -> SeamPoints:
     """Points on the seams of lit facets, a pixel apart or `most` a seam."""
     lit = trial.rays.lit
+    if trial.rays.views:
+        lit = lit & np.array([view is None for view in trial.rays.views])
     both = np.flatnonzero(lit[edges.facet_a] & lit[edges.facet_b])
     start, end = edges.start[both] - trial.rays.eye, edges.end[both] - trial.rays.eye
     facets = np.stack((edges.facet_a[both], edges.facet_b[both]))

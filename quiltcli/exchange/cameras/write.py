@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from quiltcli.display import Facets
+from quiltcli.display import Facets, demand_flat
 from quiltcli.errors import OutputError, Problem
 from quiltcli.exchange.cameras import blender, ndisplay, screens, usd
 from quiltcli.exchange.cameras.cameras import Shot, shots
 from quiltcli.exchange.cameras.json import json_text
-from quiltcli.formats.whole import write_binary
+from quiltcli.formats.whole import write_whole
 from quiltcli.layout import Layout
 from quiltcli.render.setup import Stage
 
@@ -57,7 +57,8 @@ def write_cameras(stage: Stage, frames: Sequence[int], path: Path) -> int:
         raise OutputError(Problem(f"expected a name that ends in {', '.join(FORMS)}{why}", file=str(path)))
     if path.exists():
         raise OutputError(Problem("exists already (remove it, or choose another name)", file=str(path)))
+    demand_flat(stage.facets, "quilt cameras")
     found = shots(stage.facets, stage.views(frames))
     content = form(Shooting(stage.facets, stage.layout, found, stage.job.fps))
-    write_binary(path, content.encode() if isinstance(content, str) else content)
+    write_whole(path, content.encode() if isinstance(content, str) else content)
     return sum(len(shot.cameras) for shot in found)

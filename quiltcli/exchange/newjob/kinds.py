@@ -79,6 +79,7 @@ class Kind:
         about: one line.
         needs: what it cannot do without, by option name, with the question to ask.
         build: its panels, or its ball.
+        takes: what else it can be told, by option name.
         around: whether one walks around it, rather than stands before or inside it.
         from_above: whether the viewer has to see its upper sides.
         encloses: whether it is around the viewer; `Wishes.inside` makes it so, too.
@@ -87,6 +88,7 @@ class Kind:
     about: str
     needs: dict[str, str]
     build: Callable[[Wishes], tuple[Panel, ...] | Ball]
+    takes: tuple[str, ...] = ("base",)
     around: bool = False
     from_above: bool = False
     encloses: bool = False
@@ -271,6 +273,7 @@ KINDS: dict[str, Kind] = {
         "two walls that meet; --angle is between their lit sides: 90 in a room, 270 around a building",
         {"left": "left wall, width x height, such as 8x4.5m", "right": "right wall, such as 6x4.5m"},
         _corner,
+        takes=("base", "angle"),
     ),
     "wall": Kind("one flat wall", {"size": "width x height, such as 8x4.5m"}, _wall),
     "curve": Kind(
@@ -286,6 +289,7 @@ KINDS: dict[str, Kind] = {
         "three walls and a floor around the viewer, open behind; with --ceiling five sides",
         {"size": "width x height x depth, such as 3x3x3m"},
         _cave,
+        takes=("base", "ceiling"),
         encloses=True,
     ),
     "cube": Kind(
@@ -298,12 +302,14 @@ KINDS: dict[str, Kind] = {
         "flat columns all around, lit outside; with --inside around the viewer",
         {"size": "diameter x height, such as 2x1.5m", "columns": _COLUMNS},
         _cylinder,
+        takes=("base", "inside"),
         around=True,
     ),
     "sphere": Kind(
         "a ball of flat pieces, lit outside; with --inside around the viewer",
         {"size": "diameter, such as 2m", "columns": "pieces around, such as 24", "rows": "rows, such as 12"},
         _sphere,
+        takes=("base", "inside"),
         around=True,
     ),
     "stairs": Kind(
@@ -313,6 +319,7 @@ KINDS: dict[str, Kind] = {
             "steps": "how many steps",
         },
         _stairs,
+        takes=("base", "treads"),
         from_above=True,
     ),
 }
@@ -331,6 +338,29 @@ def missing(wishes: Wishes) -> dict[str, str]:
     if wishes.pitch is None and wishes.pixels is None and wishes.cabinet is None:
         asked["grain"] = "pixel pitch, such as 3mm" if wishes.kind == "sphere" else GRAIN
     return asked
+
+
+_FIGURES = (
+    *("size", "left", "right", "angle", "radius", "columns", "rows", "steps"),
+    *("base", "inside", "ceiling", "treads"),
+)
+
+
+def check_wishes(wishes: Wishes) -> None:
+    """Whether a kind makes use of all that was said.
+
+    Raises:
+        JobError: with what means nothing to it, and what it takes instead.
+    """
+    kind = kind_of(wishes)
+    known = (*kind.needs, *kind.takes)
+    idle = [name for name in _FIGURES if getattr(wishes, name) != getattr(Wishes, name) and name not in known]
+    if idle:
+        given = ", ".join(f"--{name}" if name != "treads" else "--no-treads" for name in idle)
+        takes = ", ".join(f"--{name}" if name != "treads" else "--no-treads" for name in known)
+        raise JobError(f"{given}: means nothing to a {wishes.kind} (which takes {takes})")
+    if wishes.padding and wishes.canvas is None:
+        raise JobError("--padding is between panels on a canvas (expected --canvas 2112x1024, too)")
 
 
 def kind_of(wishes: Wishes) -> Kind:

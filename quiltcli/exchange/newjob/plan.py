@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +18,7 @@ PAPER = "#ffffff"
 _INK, _FAINT, _PANEL, _EDGE, _EYE = "#222222", "#8a8f98", "#cfe0f5", "#0072b2", "#d55e00"
 _WIDTH, _MARGIN, _HEADER, _GAP = 1200, 90, 70, 60
 _TALLEST = 640
+_HEADING = 90  # pixels from a view's heading to the view: a dimension stands between
 _NAMED = 16  # facets that are still named one by one
 
 
@@ -51,17 +53,18 @@ def draw_plan(title: str, facets: Facets, stand: Stand) -> Drawing:
 
     Panels that face a view are filled; each has its name and its size, where there are few.
     """
-    above = _view(facets, stand, (0, 2), 1, _HEADER + _GAP + 30)
-    front = _view(facets, stand, (0, 1), -1, above.corner[1] + above.size[1] + 2 * _GAP + 30)
+    above = _view(facets, stand, (0, 2), 1, _HEADER + _GAP + _HEADING)
+    front = _view(facets, stand, (0, 1), -1, above.corner[1] + above.size[1] + _GAP + 30 + _HEADING)
     items: list[Shape | Label] = [
         Label(30, 30, 22, title, _INK, "start"),
         Label(30, 54, 14, _summary(facets, stand), _FAINT, "start"),
     ]
     for view, name in ((above, "from above (the viewer looks up the page)"), (front, "from the front")):
-        items.append(Label(30, view.corner[1] - 44, 15, name, _INK, "start"))
-        items += _panels(facets, view)
-        items += _dimensions(facets, view)
-        items += _viewer(stand, view)
+        items.append(Label(30, view.corner[1] - _HEADING, 15, name, _INK, "start"))
+        viewer, words = _viewer(stand, view)
+        drawn = [*_panels(facets, view), *_dimensions(facets, view), *viewer]
+        items += drawn
+        items += apart([(words,), *_names(facets, view)], drawn)
     return Drawing(_WIDTH, math.ceil(front.corner[1] + front.size[1] + 80), tuple(items))
 
 
@@ -94,10 +97,14 @@ def _panels(facets: Facets, view: _View) -> Iterator[Shape | Label]:
         outline = view.at(facets.polygon(int(k)))
         faces = facets.normal[k, depth] > 1e-6
         yield Shape(outline, _PANEL if faces else "#eeeeee", _EDGE, 2.5)
+
+
+def _names(facets: Facets, view: _View) -> Iterator[tuple[Label, ...]]:
+    """Names of the panels; of two panels behind one another the nearer is named."""
+    depth = ({0, 1, 2} - set(view.axes)).pop()
     if facets.count <= _NAMED:
-        # Of two panels behind one another the nearer is named.
         for k in np.flatnonzero(facets.normal[:, depth] > -1e-6).tolist():
-            yield from _name(facets, k, view)
+            yield tuple(_name(facets, k, view))
 
 
 def _name(facets: Facets, k: int, view: _View) -> Iterator[Label]:
@@ -107,15 +114,59 @@ def _name(facets: Facets, k: int, view: _View) -> Iterator[Label]:
     size = f"{_metres(wide)} x {_metres(high)} m, {facets.size[k, 0]} x {facets.size[k, 1]} px"
     name = facets.names[k] or str(k + 1)
     box = np.ptp(view.at(polygon), axis=0)
-    y -= 0.22 * float(box[1])  # the eye often stands before the middle
     if facets.count <= 6 and box.min() > 44 and box[0] > 230:
         yield Label(x, y - 9, 15, name, _INK, "middle")
         yield Label(x, y + 11, 13, size, _INK, "middle")
     elif box.min() > 20:
         yield Label(x, y, 14, name, _INK, "middle")
-    elif view.axes == (0, 2):
+    elif view.axes == (0, 2) and facets.count <= 6:
         out = facets.normal[k, [0, 2]]
         yield Label(x + 46 * out[0], y + 26 * out[1], 14, name, _INK, "middle")
+
+
+def apart(groups: Iterable[tuple[Label, ...]], drawn: Sequence[Shape | Label]) -> Iterator[Label]:
+    """Labels moved, group by group, to the nearest place where nothing lies over or under them.
+
+    Args:
+        groups: labels that stay together.
+        drawn: what is there; of shapes their outlines are in the way.
+    """
+    taken = [_box(item) for item in drawn if isinstance(item, Label)]
+    taken += [piece for item in drawn if isinstance(item, Shape) for piece in _pieces(item.points)]
+    for group in groups:
+        boxes = [_box(label) for label in group]
+        free = (o for o in _OFFSETS if not any(_meet(box + (*o, *o), one) for box in boxes for one in taken))
+        offset = next(free, (0.0, 0.0))
+        taken += [box + (*offset, *offset) for box in boxes]
+        for label in group:
+            yield replace(label, x=label.x + offset[0], y=label.y + offset[1])
+
+
+_OFFSETS = sorted(
+    ((20.0 * i, 14.0 * j) for i in range(-9, 10) for j in range(-9, 10)),
+    key=lambda offset: (math.hypot(offset[0], 3 * offset[1]), offset),  # rather aside, to stay in its row
+)
+
+
+def _box(label: Label) -> FloatArray:
+    """Least x, y and greatest x, y (4,) of a label, a little wide."""
+    wide, high = 0.56 * label.size * len(label.text), 0.6 * label.size
+    left = label.x - (wide / 2 if label.anchor == "middle" else 0)
+    return np.array((left - 4, label.y - high - 2, left + wide + 4, label.y + high + 2))
+
+
+def _pieces(points: FloatArray) -> list[FloatArray]:
+    """Boxes (4,) along the outline of a shape, or along a line."""
+    found = []
+    for start, end in pairwise(np.vstack((points, points[:1]))):
+        count = max(int(np.hypot(*(end - start)) / 12), 1)
+        along = start + np.linspace(0, 1, count + 1)[:, None] * (end - start)
+        found += [np.concatenate((np.minimum(a, b), np.maximum(a, b))) for a, b in pairwise(along)]
+    return found
+
+
+def _meet(a: FloatArray, b: FloatArray) -> bool:
+    return bool((a[:2] <= b[2:]).all() and (b[:2] <= a[2:]).all())
 
 
 def _dimensions(facets: Facets, view: _View) -> Iterator[Shape | Label]:
@@ -139,18 +190,16 @@ def _dimensions(facets: Facets, view: _View) -> Iterator[Shape | Label]:
         yield Label(x1 + 34, (y1 + ground) / 2, 14, f"{_metres(low)} m", _FAINT, "start")
 
 
-def _viewer(stand: Stand, view: _View) -> Iterator[Shape | Label]:
-    """The eye, the line along which it looks, and how far off and how high it is."""
+def _viewer(stand: Stand, view: _View) -> tuple[list[Shape], Label]:
+    """The eye and the line along which it looks; and how far off, or how high, it is."""
     eye, aim = view.at(np.array([stand.eye, stand.look_at]))
-    if view.axes == (0, 2):
-        yield _line(eye, aim, _EYE, 1)
-        off = math.dist(stand.eye, stand.look_at)
-        words = f"eye, {_metres(off)} m from what is looked at"
-    else:
-        words = f"eye, {_metres(stand.eye[1])} m up"
     turn = np.linspace(0, 2 * math.pi, 24, endpoint=False)
-    yield Shape(eye + 7 * np.column_stack((np.cos(turn), np.sin(turn))), _EYE, _EYE, 1)
-    yield Label(float(eye[0]) + 14, float(eye[1]) + 14, 14, words, _EYE, "start")
+    shapes = [Shape(eye + 7 * np.column_stack((np.cos(turn), np.sin(turn))), _EYE, _EYE, 1)]
+    words = f"eye, {_metres(stand.eye[1])} m up"
+    if view.axes == (0, 2):
+        shapes.insert(0, _line(eye, aim, _EYE, 1))
+        words = f"eye, {_metres(math.dist(stand.eye, stand.look_at))} m from what is looked at"
+    return shapes, Label(float(eye[0]) + 14, float(eye[1]) + 14, 14, words, _EYE, "start")
 
 
 def _arrow(a: FloatArray, b: FloatArray) -> Iterator[Shape]:

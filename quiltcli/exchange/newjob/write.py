@@ -13,7 +13,7 @@ from quiltcli.display import Facets, build_facets, load_display
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.exchange.newjob import texts
 from quiltcli.exchange.newjob.figures import length_text
-from quiltcli.exchange.newjob.kinds import Ball, Panel, Wishes, kind_of
+from quiltcli.exchange.newjob.kinds import Ball, Panel, Wishes, check_wishes, kind_of
 from quiltcli.exchange.newjob.plan import PAPER, draw_plan
 from quiltcli.exchange.newjob.stand import Stand, stand_for
 from quiltcli.formats.drawing.png import write_png
@@ -21,9 +21,9 @@ from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.whole import make_folder, write_text
 from quiltcli.formats.yaml.source import Source
 from quiltcli.job import DisplayFile, PackSpec, PanelSpec, ResolutionSpec
-from quiltcli.job.display import PlaceOnPage
 from quiltcli.job.frames import parse_frames
 from quiltcli.job.model import MESHES, attach
+from quiltcli.job.places import PlaceOnPage
 from quiltcli.layout import Layout
 from quiltcli.layout.file import layout_text
 from quiltcli.layout.from_job import layout_for
@@ -56,6 +56,7 @@ def new_job(wishes: Wishes, folder: Path) -> NewJob:
         JobError: figures that cannot be read, or that make no display.
         DisplayError, LayoutError: panels that are no facets, or do not fit the canvas.
     """
+    check_wishes(wishes)
     frames = parse_frames(wishes.frames)
     content = _content(wishes, folder)
     files, facets = _display(wishes, kind_of(wishes).build(wishes), folder)

@@ -9,6 +9,7 @@ from quiltcli.exchange.pixelmaps.formats import (
     write_map,
 )
 from quiltcli.exchange.pixelmaps.naming import facet_label, page_files, parse_label
+from quiltcli.exchange.pixelmaps.xyz import write_display_map
 
 __all__ = [
     "FORMATS",
@@ -19,5 +20,6 @@ __all__ = [
     "page_files",
     "parse_label",
     "read_map",
+    "write_display_map",
     "write_map",
 ]

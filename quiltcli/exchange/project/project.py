@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from quiltcli.display import demand_flat
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.exchange.elsewhere import Made, MadeOptions, prepare_made, write_made
 from quiltcli.exchange.project.lenses import Lens
@@ -70,6 +71,7 @@ def project(
     if master.stereo and not job.is_stereo:
         raise JobError("--stereo is for two eyes (the job has one; viewer.stereo gives it two)")
     ready = prepare_made(job, options, f"project {master.kind}")
+    demand_flat(ready.stage.facets, "quilt project")
     raise_all(OutputError, _missing(ready, master))
     threads = options.threads or default_threads()
     with ThreadPoolExecutor(threads) as pool:

@@ -52,6 +52,19 @@ def page(title: str, data: Mapping[str, Any]) -> str:
     return _SLOT.sub(lambda slot: parts[slot[1]], _text("page/page.html"))
 
 
+def turning_page(title: str, data: Mapping[str, Any]) -> str:
+    """The page to walk around a display with a spinning mirror; as strict as the other one."""
+    script = _text("page/turning.js")
+    parts = {
+        "TITLE": html.escape(title),
+        "POLICY": f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {_hash(script)}",
+        "STYLE": _text("page/turning.css"),
+        "DATA": json_text(data),
+        "SCRIPT": script,
+    }
+    return _SLOT.sub(lambda slot: parts[slot[1]], _text("page/turning.html"))
+
+
 def _text(name: str) -> str:
     return (files("quiltcli.exchange.web") / name).read_text(encoding="utf-8")
 

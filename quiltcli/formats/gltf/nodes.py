@@ -14,6 +14,7 @@ from quiltcli.geometry import FloatArray, IntArray
 
 INSTANCING = "EXT_mesh_gpu_instancing"
 _AFFINE = 1e-6
+_SHORTEST = 1e-100
 _ONE = np.eye(4)[None]
 
 
@@ -127,7 +128,8 @@ def _shown(json: Json, parent: IntArray, children: Sequence[Sequence[int]]) -> I
 
 def _rotation(entry: Json) -> tuple[float, ...]:
     quaternion = entry.numbers(4)
-    if not any(quaternion):
+    # Any length will do, but its square has to be a number.
+    if not _SHORTEST < max(map(abs, quaternion)) < 1 / _SHORTEST:
         raise entry.expected("a unit quaternion")
     return quaternion
 

@@ -189,7 +189,6 @@ class _Reader:
             yield f"{counted(other_channels, 'animation channel')} left out, which move no node"
         if self.container.repeated:
             yield f"the key {self.container.repeated[0][:40]!r} stands twice in one object (the last counts)"
-        yield from self._alpha_notices()
         said = set(READ) | set(_SPOKEN_OF)
         for name, users in self._material_extensions().items():
             said.add(name)
@@ -198,13 +197,6 @@ class _Reader:
             if item.text() not in said:
                 said.add(item.text())
                 yield f"the extension {item.text()[:60]} is not read"
-
-    def _alpha_notices(self) -> Iterator[str]:
-        """Materials that let light through, which no picture shows yet."""
-        for mode, words in (("MASK", "cut out"), ("BLEND", "transparent")):
-            users = [_name(m, i) for i, m in sorted(self.materials.items()) if m.alpha_mode == mode]
-            if users:
-                yield f"{words} materials are drawn opaque ({_listed(users)})"
 
     def _material_extensions(self) -> dict[str, list[str]]:
         """Extensions of shown materials that are not read, with the materials' names."""

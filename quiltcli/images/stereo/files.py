@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
-from quiltcli.formats.exr.image import Image, part_names, read_exr, write_exr
+from quiltcli.formats.exr.image import Image, part_names, write_exr
 from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import Float32Array
+from quiltcli.images.layers import read_view
 from quiltcli.images.names import frame_digits, names_in
 from quiltcli.images.stereo.anaglyph import MATRICES, anaglyph, luma
 from quiltcli.images.stereo.packing import (
@@ -95,7 +96,8 @@ def find_pairs(out: Path, options: StereoOptions) -> list[Pair]:
     for name, path in names_in(out).found(out):
         if name.kind != kind or (options.frames is not None and name.frame not in options.frames):
             continue
-        eyes = (name.eye,) if name.eye else [part for part in part_names(path) if part in EYES]
+        parts = (name.eye,) if name.eye else part_names(path)
+        eyes = dict.fromkeys(part.partition(".")[0] for part in parts if part.partition(".")[0] in EYES)
         for eye in eyes:
             found.setdefault((name.number, name.frame), {})[eye] = (path, "" if name.eye else eye)
     missing = sorted({frame for (_, frame), eyes in found.items() if set(eyes) != set(EYES)})
@@ -179,7 +181,7 @@ def _layout_of(out: Path) -> Layout:
 
 def _light(path: Path, part: str) -> tuple[Image, Float32Array]:
     """An image, and its red, green, blue and alpha (4, H, W)."""
-    image = read_exr(path, part)
+    image = read_view(path, part)
     channels = whole_frame(image)
     if missing := [name for name in "RGB" if name not in channels]:
         raise OutputError(Problem(f"lacks the channels {', '.join(missing)}", file=str(path)))
@@ -194,7 +196,7 @@ def _channels(light: Float32Array) -> dict[str, Float32Array]:
 
 def _attributes(image: Image, options: StereoOptions) -> dict[str, object]:
     """What is true of the new image, too: all but what told one eye from the other."""
-    apart = ("view", "multiView", "quilt:eye")
+    apart = ("view", "multiView", "quilt:eye", "quilt:pose")
     kept = {name: value for name, value in image.attributes.items() if name not in apart}
     return kept | {"quilt:stereo": options.mode}
 

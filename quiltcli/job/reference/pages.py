@@ -73,8 +73,8 @@ def _rows(schema: dict[str, Any], model: dict[str, Any], places: dict[int, str])
 
 def _heading(path: str, model: dict[str, Any]) -> str:
     """What stands over a section; mappings that may stand at one place say what tells them apart."""
-    constant = model["properties"].get("type", {}).get("const")
-    return f"`{path}`" + (f", `type: {constant}`" if constant else "")
+    told = ((key, model["properties"].get(key, {}).get("const")) for key in ("type", "kind"))
+    return f"`{path}`" + "".join(f", `{key}: {constant}`" for key, constant in told if constant)
 
 
 def _links(sections: list[tuple[str, dict[str, Any]]]) -> dict[int, str]:

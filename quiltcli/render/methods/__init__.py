@@ -6,7 +6,7 @@ rasterizer; the others have a module each. All share scene, shading, channels an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,19 +14,25 @@ import numpy as np
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import Crew
+from quiltcli.render.frame import Exposure, TooNearError
 from quiltcli.render.frame import draw_frame as rasterize_frame
+from quiltcli.render.methods.cubemap import draw_cubemap
 from quiltcli.render.methods.raycast import cast_frame
+from quiltcli.render.methods.tessellate import draw_tessellated
 from quiltcli.render.methods.twopass import draw_twice
+from quiltcli.render.moments import Moment
 from quiltcli.render.report import FrameRecord, together
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.view import View
 from quiltcli.viewer.viewer import Viewer
 
-__all__ = ["OTHERS", "draw_frame", "draw_view"]
+__all__ = ["OTHERS", "draw_frame", "draw_moment", "draw_view"]
 
 OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], FrameRecord]] = {
     "twopass": draw_twice,
     "raycast": cast_frame,
+    "cubemap": draw_cubemap,
+    "tessellate": draw_tessellated,
 }
 """Methods that do not rasterize the quilt."""
 
@@ -40,17 +46,33 @@ def draw_frame(
     *,
     dirty: BoolArray | None = None,
     crew: Crew | None = None,
+    exposures: Iterable[Exposure] | None = None,
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet, by the job's method; see `frame.draw_frame`."""
     other = OTHERS.get(stage.job.render.method)
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
-    return rasterize_frame(stage, viewer, buffers, threads, only, dirty=dirty, crew=crew)
+    try:
+        return rasterize_frame(
+            stage, viewer, buffers, threads, only, dirty=dirty, crew=crew, exposures=exposures
+        )
+    except TooNearError:
+        if stage.job.render.samples > 1 or exposures is not None:
+            raise
+        if dirty is not None:
+            dirty[:] = True
+        return cast_frame(stage, viewer, buffers, threads, only)
 
 
 def draw_view(
-    stage: Stage,
-    view: View,
+    stage: Stage, view: View, buffers: Buffers, threads: int = 1, only: BoolArray | None = None
+) -> FrameRecord:
+    """Draw a view as it is at once, the shutter closed: what each of its viewers sees on their facets."""
+    return draw_moment(Moment(stage, view), buffers, threads, only)
+
+
+def draw_moment(
+    moment: Moment,
     buffers: Buffers,
     threads: int = 1,
     only: BoolArray | None = None,
@@ -58,12 +80,16 @@ def draw_view(
     dirty: BoolArray | None = None,
     crew: Crew | None = None,
 ) -> FrameRecord:
-    """Draw a view: what each of its viewers sees on facets of their own. Arguments as for `draw_frame`."""
-    records = [
-        draw_frame(stage, viewer, buffers, threads, theirs, dirty=dirty, crew=crew)
-        for viewer, theirs in facets_by_viewer(view, stage.facets.count, only)
-    ]
-    return replace(together(records), eye=view.eye)
+    """Draw what each viewer sees on facets of their own. Arguments as for `draw_frame`."""
+    stage, view = moment.stage, moment.view
+    records = []
+    for number, (viewer, theirs) in enumerate(facets_by_viewer(view, stage.facets.count, only)):
+        open_for = moment.exposures(number)
+        records.append(
+            draw_frame(stage, viewer, buffers, threads, theirs, dirty=dirty, crew=crew, exposures=open_for)
+        )
+    record = together(records)
+    return replace(record, eye=view.eye, warnings=(*record.warnings, *moment.warnings))
 
 
 def facets_by_viewer(

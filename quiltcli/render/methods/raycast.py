@@ -17,8 +17,10 @@ import numpy as np
 
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
-from quiltcli.projection.planar import quilt_rays
+from quiltcli.projection.gaze import Gaze
+from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background
+from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage
 from quiltcli.shading.adaptive import Shaded
@@ -27,7 +29,7 @@ from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Hits
 from quiltcli.visibility.rays.embree import Target, aim, cast, plane_distance, reach_along
 from quiltcli.visibility.rays.exact import Neighbours, intersect
-from quiltcli.visibility.rays.pixels import OFFSETS, Places, places
+from quiltcli.visibility.rays.pixels import OFFSETS, Places, lit_pixels, places
 from quiltcli.visibility.resolve.hits import point_hits
 from quiltcli.visibility.setup.planes import LATTICE
 
@@ -49,18 +51,20 @@ def cast_frame(
     lit = lit_facets(stage.facets, viewer.eye)
     if only is not None:
         lit &= only
-    rays = quilt_rays(stage.layout, lit, viewer.eye)
-    target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
+    rays = viewer_rays(stage.layout, stage.facets, lit, viewer)
+    gaze = Gaze(viewer, rays)
+    target = target_of(stage, viewer)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     sloped = stage.scene.textures is not None
     clear(stage, buffers, only)
-    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers)
+    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers, rays)
 
     def draw(address: IntArray) -> int:
+        address = address[lit_pixels(address, stage.layout, stage.owners, rays)]
         pixels = places(address, stage.layout, stage.owners, rays)
         hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals, sloped=sloped)
         if hits.triangle.size:
-            fill(buffers, stage.job.output.channels, viewer, Shaded(stage.scene, viewer.eye, hits))
+            fill(buffers, stage.job.output.channels, gaze, Shaded(stage.scene, viewer.eye, hits))
         return hits.inside
 
     with ThreadPoolExecutor(threads) as pool:
@@ -71,11 +75,29 @@ def cast_frame(
         reaching=0,
         pairs=0,
         settled=0,
+        binned=False,
         lit_facets=int(np.count_nonzero(rays.lit)),
         visible_pixels=visible,
         fill=stage.fill,
         seconds={"cast and shade": time.perf_counter() - begin},
-        warnings=() if visible else ("no pixel shows the scene",),
+        warnings=tuple(frame_warnings(stage, viewer, lit, pairs=1, visible=visible)),
+    )
+
+
+def target_of(stage: Stage, viewer: Viewer) -> Target:
+    """The stage's scene as rays of a viewer meet it.
+
+    Raises:
+        MissingExtraError: there is no Embree on this machine.
+    """
+    scene, how = stage.scene, stage.job.render
+    return aim(
+        scene.vertices,
+        scene.triangles,
+        viewer,
+        how.backface_culling,
+        one_sided=scene.one_sided if how.double_sided == "file" else None,
+        invisible=scene.invisible,
     )
 
 
@@ -105,15 +127,15 @@ def cast_pixels(
         facet=pixels.facet[rows].astype(np.int32),
         triangle=triangle.astype(np.int32),
         position=points,
-        weights=np.stack(_weights(target, triangle, position)),
+        weights=np.stack(barycentric(target, triangle, position)),
         depth=target.viewer.depth_of(points),
         normals=normals,
         inside=int(np.count_nonzero(~pixels.bleed[rows])),
-        slopes=_slopes(target, triangle, matrix, ray, position) if sloped else None,
+        slopes=weight_slopes(target, triangle, matrix, ray, position) if sloped else None,
     )
 
 
-def _weights(target: Target, triangle: IntArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
+def barycentric(target: Target, triangle: IntArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Barycentric weights (P,) of the second and third corner at points (P, 3) of triangles (P,)."""
     a, b, c = (target.corners[target.triangles[triangle, k]] for k in range(3))
     normal = target.plane[triangle, :3]
@@ -122,7 +144,7 @@ def _weights(target: Target, triangle: IntArray, position: FloatArray) -> tuple[
     return second, dot(normal, cross(b - a, position - a)) / area
 
 
-def _slopes(
+def weight_slopes(
     target: Target, triangle: IntArray, matrix: FloatArray, ray: FloatArray, position: FloatArray
 ) -> FloatArray:
     """How the weights of points change from pixel to pixel (2, 2, P) [weight, axis].
@@ -144,7 +166,7 @@ def _slopes(
     for axis in range(2):
         step = matrix[:, :, axis]
         moved = scale[:, None] * (step - ray * (dot(normal, step) / along)[:, None])
-        result[:, axis] = _weights(target, triangle, a + moved)
+        result[:, axis] = barycentric(target, triangle, a + moved)
     return result
 
 

@@ -19,10 +19,11 @@ from quiltcli.channels import CHANNELS
 from quiltcli.display import lit_facets
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.projection.camera import camera_display, viewer_frustum
-from quiltcli.projection.planar import quilt_rays
+from quiltcli.projection.planar import quilt_rays, viewer_rays
 from quiltcli.render.buffers import Buffers, clear, new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.methods.raycast import pixels_of
+from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage, stage_of
 from quiltcli.viewer.viewer import Viewer
@@ -45,19 +46,28 @@ def draw_twice(
     if only is not None:
         lit &= only
     clear(stage, buffers, only)
-    visible = 0
-    rays = quilt_rays(stage.layout, lit, viewer.eye)
+    visible = outside = 0
+    rays = viewer_rays(stage.layout, stage.facets, lit, viewer)
     for address in pixels_of(stage, rays.lit):
         pixels = places(address, stage.layout, stage.owners, rays)
         place = _projected(to_picture, pixels.directions())
         on = np.isfinite(place[0]) & (place >= 0).all(axis=0) & (place[0] < size[0]) & (place[1] < size[1])
         mine = np.flatnonzero(on)
+        outside += int(np.count_nonzero(~on & ~pixels.bleed))
         look_up(buffers, picture, size, address[mine], place[:, mine], pixels.facet[mine] + 1)
         nearest = _address(np.floor(place[:, mine]).astype(np.int64), size)
         seen = np.isfinite(picture["Z"][nearest])
         visible += int(np.count_nonzero(seen & ~pixels.bleed[mine]))
+    warnings = list(frame_warnings(stage, viewer, lit, record.pairs, visible))
+    if outside:
+        share = 100 * outside / np.count_nonzero(np.append(False, rays.lit)[np.maximum(stage.owners, 0)])
+        warnings.append(
+            f"{share:.1f} % of the lit pixels lie outside the picture of the first pass and stay empty"
+        )
     return replace(
         record,
+        binned=False,
+        warnings=tuple(warnings),
         lit_facets=int(np.count_nonzero(rays.lit)),
         visible_pixels=visible,
         fill=stage.fill,

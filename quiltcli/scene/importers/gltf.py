@@ -99,17 +99,19 @@ class FileLight:
         position: metres; of no account for a directional light.
         direction: the way it shines, unit; of no account for a point light.
         color: irradiance of a directional light, radiant intensity of the others.
-        limited: whether the file says how far it shines.
+        reach: how far it shines, metres; infinite where the file says nothing.
+        cone: angles, radians, from a spot's direction to where it begins to fade and to where it is dark.
     """
 
     kind: str
     position: tuple[float, float, float]
     direction: tuple[float, float, float]
     color: tuple[float, float, float]
-    limited: bool
+    reach: float
+    cone: tuple[float, float]
 
     def placed(self, matrix: FloatArray) -> FileLight:
-        """The light moved by an affine (4, 4) matrix; its strength stays."""
+        """The light moved by an affine (4, 4) matrix; its strength, its range and its cone stay."""
         along = matrix[:3, :3] @ np.array(self.direction)
         return replace(
             self,
@@ -195,8 +197,11 @@ def contested_channels(model: GltfModel, playing: Playing) -> int:
 def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
     primitive = piece.primitive
     colors: Float32Array | None = None
+    opacities: Float32Array | None = None
     if primitive.colors is not None:
         colors = np.tile(primitive.colors[:, :3], (piece.copies, 1))
+        if (primitive.colors[:, 3] < 1).any():
+            opacities = np.tile(primitive.colors[:, 3], piece.copies)
     return Part(
         vertices=there.vertices,
         triangles=placed_triangles(piece, mirrored),
@@ -205,6 +210,8 @@ def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
         surface=surface_of(gltf.materials[primitive.material], gltf),
         uv=_v_up(primitive.uv[0], piece.copies),
         uv1=_v_up(primitive.uv[1], piece.copies),
+        material=gltf.materials[primitive.material].name,
+        opacities=opacities,
     )
 
 
@@ -221,6 +228,10 @@ def surface_of(material: Material, gltf: Gltf | None = None) -> Surface:
         roughness=material.roughness,
         emission=(0.0, 0.0, 0.0) if material.unlit else material.emission,
         unlit=material.unlit,
+        opacity=material.color[3],
+        alpha=material.alpha_mode.lower(),
+        cutoff=material.cutoff,
+        double_sided=material.double_sided,
         textures=() if gltf is None else tuple(_textures(gltf, material)),
     )
 
@@ -267,5 +278,6 @@ def _lights(gltf: Gltf, world: FloatArray) -> Iterator[FileLight]:
             position=_triple(place[:3, 3]),
             direction=_triple(normalized(-place[:3, 2])),
             color=(red, green, blue),
-            limited=bool(np.isfinite(light.reach)),
+            reach=light.reach,
+            cone=(light.inner, light.outer),
         )

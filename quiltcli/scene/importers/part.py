@@ -23,6 +23,8 @@ class Part:
         mirrored: whether its placement turned the winding inside out.
         uv: (V, 2) texture coordinates, v up, NaN for a vertex without any, or None.
         uv1: (V, 2) those of the second set, likewise.
+        material: name of its material, empty where the file gives none.
+        opacities: (V,) alpha, or None.
     """
 
     vertices: FloatArray
@@ -33,6 +35,8 @@ class Part:
     mirrored: bool = False
     uv: FloatArray | None = None
     uv1: FloatArray | None = None
+    material: str = ""
+    opacities: Float32Array | None = None
 
 
 def placed(part: Part, matrix: FloatArray) -> Part:

@@ -5,6 +5,7 @@ Kd and Ke of MTL are linear, as numbers in a file are.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,8 +47,10 @@ def parts_of_polygons(mesh: PolygonMesh) -> PolygonParts:
     # The material that comes last is the first part: triangles keep the numbers they always had.
     for row in rows[np.argsort(-first, kind="stable")]:
         chosen = triangles.corners[_order(owner == row, counts[triangles.face])]
-        surface = surface_of(mesh.materials[row] if row >= 0 else None, colored=mesh.colors is not None)
-        parts.append(_part(mesh, vertices, chosen, surface))
+        made_of = mesh.materials[row] if row >= 0 else None
+        surface = surface_of(made_of, colored=mesh.colors is not None)
+        part = _part(mesh, vertices, chosen, surface)
+        parts.append(part if made_of is None else replace(part, material=made_of.name))
     return PolygonParts(parts, covered, int(np.count_nonzero(counts < 3)))
 
 
@@ -121,6 +124,8 @@ def surface_of(material: MeshMaterial | None, *, colored: bool) -> Surface:
         "roughness": material.roughness,
         "metallic": material.metallic,
     }
+    if material.opacity is not None and material.opacity < 1:
+        keys |= {"opacity": min(max(material.opacity, 0.0), 1.0), "alpha": "blend"}
     if material.shininess is not None and material.roughness is None:
         # Blinn's exponent to GGX's alpha, 2/(Ns + 2) = alpha², alpha = roughness².
         keys["roughness"] = (2 / (max(material.shininess, 0.0) + 2)) ** 0.25
@@ -129,6 +134,8 @@ def surface_of(material: MeshMaterial | None, *, colored: bool) -> Surface:
     for texture in textures:
         if texture.role in _OF_PICTURES and not np.any(getattr(material, texture.role) or 0):
             keys[texture.role] = _OF_PICTURES[texture.role]
+        if texture.role == "opacity":
+            keys.setdefault("alpha", "blend")
     return surface.overridden({k: v for k, v in keys.items() if v is not None} | {"textures": textures})
 
 

@@ -26,7 +26,7 @@ from quiltcli.scene.scene import Scene
 from quiltcli.scene.textures.levels import Texels, level_sizes, levels_of
 from quiltcli.scene.textures.picture import Picture
 
-ROLES = ("color", "emission", "metallic", "roughness", "normal", "occlusion")
+ROLES = ("color", "emission", "metallic", "roughness", "normal", "occlusion", "opacity")
 """What textures vary that are drawn."""
 IN_SRGB = ("color", "emission")
 """Roles of textures whose numbers are encoded for displays."""

@@ -28,7 +28,8 @@ def covers_of(scene: Scene) -> Kinds | None:
     textures, materials = scene.textures, scene.materials
     if textures is None:
         return None
-    has = {role: slot.image >= 0 for role, slot in textures.slots.items()}
+    # What a surface holds up of light from behind makes no difference to its own.
+    has = {role: slot.image >= 0 for role, slot in textures.slots.items() if role != "opacity"}
     none = np.zeros(materials.unlit.shape, dtype=np.bool_)
     result = np.full(none.shape, PLAIN, dtype=np.uint8)
     for role in has:

@@ -5,13 +5,15 @@ A lost sample is never a zero, and nothing is ever extrapolated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from quiltcli.errors import ViewerError
-from quiltcli.geometry import BoolArray, FloatArray, dot, quaternions
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, quaternions
 from quiltcli.job import GapsSpec
 from quiltcli.viewer.recorded.take import Take, wrong
 
@@ -65,6 +67,7 @@ class Cleaned:
         spikes: (S,) seconds of samples that jump away and back, left out.
         noise: standard deviation of a coordinate from one sample to the next, metres.
         turn_noise: the same of an angle, radians; None without rotations.
+        turns: (R,) seconds at which the head turns faster than anybody's, and stays so; no gaps.
     """
 
     runs: tuple[Run, ...]
@@ -76,6 +79,7 @@ class Cleaned:
     spikes: FloatArray
     noise: float
     turn_noise: float | None
+    turns: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def jumps(self) -> tuple[Gap, ...]:
@@ -99,13 +103,19 @@ def clean(take: Take, spec: GapsSpec) -> Cleaned:
     times, positions = merged.times[good], merged.positions[good]
     rotations = None if merged.rotations is None else quaternions.continuous(merged.rotations[good])
     noise = white_noise(positions)
+    turn_noise = None if rotations is None else white_noise(_turn_steps(rotations))
     kept = np.ones(len(times), dtype=np.bool_)
     if not take.is_curve:
-        kept = ~_spikes(times, positions, spec, noise, step)
+        kept = ~_spikes(times, _ways(positions, spec, noise), spec, step)
+        if rotations is not None:
+            kept &= ~_spikes(times, _turns(rotations, spec, turn_noise or 0.0), spec, step)
     spikes = times[~kept]
     times, positions = times[kept], positions[kept]
     rotations = None if rotations is None else rotations[kept]
-    jump = _jumps(times, positions, spec.jump, noise) & (not take.is_curve)
+    jump = _ways(positions, spec, noise).jumps(times) & (not take.is_curve)
+    turned = np.zeros(len(jump), dtype=np.bool_)
+    if rotations is not None and not take.is_curve:
+        turned = _turns(rotations, spec, turn_noise or 0.0).jumps(times)
     apart = np.diff(times)
     late = (apart > _LATE * step) & (not take.is_curve)
     cuts = np.flatnonzero(jump | (late & (apart > spec.fill + SAME_STAMP)))
@@ -122,7 +132,8 @@ def clean(take: Take, spec: GapsSpec) -> Cleaned:
         doubled=doubled,
         spikes=spikes,
         noise=noise,
-        turn_noise=None if rotations is None else white_noise(_turn_steps(rotations)),
+        turn_noise=turn_noise,
+        turns=times[1:][turned],
     )
 
 
@@ -187,24 +198,61 @@ def _group_sums(values: FloatArray, group: np.ndarray, good: BoolArray) -> Float
     )
 
 
-def _jumps(times: FloatArray, positions: FloatArray, speed: float, noise: float) -> BoolArray:
-    """Whether each sample (N,) is too far from the next (N − 1,) for anybody to get there."""
-    way = np.diff(positions, axis=0)
-    return np.asarray(np.sqrt(dot(way, way)) > speed * np.diff(times) + _NOISE * noise)
+@dataclass(frozen=True)
+class _Motion:
+    """How far samples are from one another, and how far anybody gets.
+
+    Attributes:
+        between: distances (k,) of samples from others, both given by index.
+        speed: the greatest that is believed, in distances a second.
+        slack: what noise alone may make of a distance.
+    """
+
+    between: Callable[[IntArray, IntArray], FloatArray]
+    speed: float
+    slack: float
+
+    def too_far(self, times: FloatArray, first: IntArray, last: IntArray) -> BoolArray:
+        """Whether nobody gets from some samples (k,) to later ones."""
+        return np.asarray(self.between(first, last) > self.speed * (times[last] - times[first]) + self.slack)
+
+    def jumps(self, times: FloatArray) -> BoolArray:
+        """Whether each sample (N,) is too far from the next (N − 1,) for anybody to get there."""
+        first = np.arange(max(len(times) - 1, 0))
+        return self.too_far(times, first, first + 1)
 
 
-def _spikes(times: FloatArray, positions: FloatArray, spec: GapsSpec, noise: float, step: float) -> BoolArray:
+def _ways(positions: FloatArray, spec: GapsSpec, noise: float) -> _Motion:
+    """Distances of places (N, 3), metres."""
+
+    def between(first: IntArray, last: IntArray) -> FloatArray:
+        way = positions[last] - positions[first]
+        return np.asarray(np.sqrt(dot(way, way)))
+
+    return _Motion(between, spec.jump, _NOISE * noise)
+
+
+def _turns(rotations: FloatArray, spec: GapsSpec, noise: float) -> _Motion:
+    """Angles between rotations (N, 4), radians."""
+
+    def between(first: IntArray, last: IntArray) -> FloatArray:
+        cosine = np.abs((rotations[first] * rotations[last]).sum(axis=1))
+        return np.asarray(2 * np.arccos(np.minimum(cosine, 1.0)))
+
+    # An angle gathers the noise of three axes, and the cosine of nothing is 1 to half the digits alone.
+    return _Motion(between, math.radians(spec.jump_deg), _NOISE * math.sqrt(3) * noise + 1e-6)
+
+
+def _spikes(times: FloatArray, motion: _Motion, spec: GapsSpec, step: float) -> BoolArray:
     """Samples (N,) that jump away and come back within what may be filled."""
     out = np.zeros(len(times), dtype=np.bool_)
-    edges = np.flatnonzero(_jumps(times, positions, spec.jump, noise)) + 1
+    edges = np.flatnonzero(motion.jumps(times)) + 1
     at = 0
     while at + 1 < len(edges):
         first, last = edges[at], edges[at + 1]
         before = first - 1
-        seconds = times[last] - times[before]
-        way = positions[last] - positions[before]
-        near = float(np.sqrt(dot(way, way))) <= spec.jump * seconds + _NOISE * noise
-        if near and seconds <= max(spec.fill, 2 * step) + SAME_STAMP:
+        near = not motion.too_far(times, np.array([before]), np.array([last]))[0]
+        if near and times[last] - times[before] <= max(spec.fill, 2 * step) + SAME_STAMP:
             out[first:last] = True
             at += 2
         else:

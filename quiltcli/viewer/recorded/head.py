@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -62,6 +63,21 @@ def _read(spec: RecordedSpec, changed: int, size: int, notes: int) -> Head:
     cleaned = clean(take, spec.gaps)
     runs = tuple(filtered(run, spec.filter, cleaned.step, straight=take.is_curve) for run in cleaned.runs)
     return Head(take, cleaned, runs)
+
+
+def take_notices(spec: RecordedSpec) -> Iterator[str]:
+    """What should be known of a take by who renders with it; `quilt path` says all there is."""
+    head = read_head(spec)
+    for notice in head.take.notices:
+        yield f"{spec.file}: {notice}"
+    spikes, turns = head.cleaned.spikes, head.cleaned.turns
+    if spikes.size:
+        count = f"{spikes.size} samples" if spikes.size > 1 else "1 sample"
+        words = f"left out, the first at second {spikes[0]:.3f}: away from all others and back at once"
+        yield f"{spec.file}: {count} {words}"
+    if turns.size:
+        words = f"the head turns faster than any at second {turns[0]:.3f}, and stays so (a marker mistaken?)"
+        yield f"{spec.file}: {words}"
 
 
 def pose_of(

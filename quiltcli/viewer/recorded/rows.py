@@ -33,7 +33,15 @@ from quiltcli.viewer.recorded.columns import (
     rotations_of,
     turn_groups,
 )
-from quiltcli.viewer.recorded.tables import MOST_PROBLEMS, Dialect, Rows, dialect_of, read_rows, take_lines
+from quiltcli.viewer.recorded.tables import (
+    MOST_PROBLEMS,
+    Dialect,
+    Rows,
+    dialect_of,
+    read_rows,
+    separator_problem,
+    take_lines,
+)
 from quiltcli.viewer.recorded.take import Y_UP, wrong
 
 _NAMES = ("frame", *EYE, *LOOK_AT, *LOOK, *UP, *QUATERNION, *HEADING)
@@ -80,8 +88,8 @@ def read_track(path: Path) -> Track:
 def _read(path: Path, changed: int, size: int, notes: int) -> Track:
     lines = take_lines(path)
     dialect = dialect_of(lines)
-    if dialect.separator not in (",", ";", "\t"):
-        dialect = Dialect(",")
+    if problem := separator_problem(path, lines, dialect):
+        raise ViewerError(problem)
     good = (k for k, line in enumerate(lines) if _is_row(line, dialect))
     at = next(good, None)
     names = _header(lines[at], at + 1, dialect, path) if at is not None else ()

@@ -83,14 +83,52 @@ def check_size(path: Path) -> None:
 def dialect_of(lines: Sequence[str]) -> Dialect:
     """How the cells of a table are told apart, from some of its lines.
 
-    Semicolons beside commas between digits are the export of a system with decimal commas.
+    Semicolons or tabs beside commas between digits are the export of a system with decimal commas.
     """
-    text = "\n".join(line for line in lines[:50] if not line.lstrip().startswith("#"))
+    some = [line for line in lines[:50] if line.strip() and not line.lstrip().startswith("#")]
+    text = "\n".join(some)
     if ";" in text:
         return Dialect(";", decimal_comma="," in text)
+    tabs = {line.count("\t") for line in some}
+    if "," in text and tabs and min(tabs) >= _LEAST - 1 and len(tabs) == 1:
+        return Dialect("\t", decimal_comma=True)
     if "," in text:
         return Dialect(",")
     return Dialect("\t" if "\t" in text else "")
+
+
+_LEAST = 4  # columns of a path: when, and x, y, z
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", ":": "colons", " ": "blanks"}
+
+
+def separator_problem(path: Path, lines: Sequence[str], dialect: Dialect) -> Problem | None:
+    """What is wrong with how a table separates its columns, by its first two lines; None if nothing is."""
+    good = (k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#"))
+    first, second = next(good, None), next(good, None)
+    if first is None or second is None:
+        return None
+    names, row = (len(dialect.cells(lines[k])) for k in (first, second))
+    by, also = (_separator_of(lines[k]) for k in (first, second))
+    if 1 in (names, row) and by and also:
+        if by == also:
+            words = f"the columns are separated by {_SEPARATORS[by]} (expected commas, semicolons or tabs)"
+            return Problem(words, str(path), first + 1, 1)
+        words = f"columns separated by {_SEPARATORS[also]} under names separated by {_SEPARATORS[by]}"
+        return Problem(f"{words} (expected one and the same)", str(path), second + 1, 1)
+    if dialect.separator == "," and _LEAST <= names < row <= 2 * names and lines[first].strip()[:1].isalpha():
+        words = f"{row} cells under {names} names: are commas decimal points here?"
+        return Problem(f"{words} (separate the columns by semicolons)", str(path), second + 1, 1)
+    return None
+
+
+def _separator_of(line: str) -> str:
+    """What seems to separate the columns of a line, empty where nothing makes enough of it."""
+    for mark in (";", "\t", "|", ":"):
+        if len(line.strip().split(mark)) >= _LEAST:
+            return mark
+    if len(line.split()) >= _LEAST and ", " not in line:
+        return " "
+    return "," if len(line.split(",")) >= _LEAST else ""
 
 
 def read_rows(

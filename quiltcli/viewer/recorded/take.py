@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -122,8 +123,29 @@ def settle(recording: Recording, spec: RecordedSpec) -> Take:
         path=spec.file,
         lines=recording.lines,
         is_curve=recording.is_curve,
-        notices=recording.notices,
+        notices=(*recording.notices, *_other_rates(recording, spec, times)),
     )
+
+
+def _other_rates(recording: Recording, spec: RecordedSpec, times: FloatArray) -> Iterator[str]:
+    """What is said of rates, stated by the file or the job, that are not those of the samples."""
+    if recording.times is None:
+        if spec.rate is not None and recording.rate is not None and _apart(spec.rate, recording.rate):
+            yield f"states {recording.rate:.6g} samples a second, the job {spec.rate:.6g}, which holds"
+        return
+    steps = np.diff(times)
+    steps = steps[steps > 0]
+    if steps.size:
+        # The mean of the usual steps: stamps may be rounded to milliseconds, and samples be lost.
+        found = 1 / float(steps[steps <= 1.5 * np.median(steps)].mean())
+        for who, rate in (("states", recording.rate), ("is said by the job to have", spec.rate)):
+            if rate is not None and _apart(rate, found):
+                yield f"{who} {rate:.6g} samples a second, but its stamps come {found:.4g} a second"
+
+
+def _apart(one: float, other: float) -> bool:
+    """Whether two rates are more than two hundredths apart."""
+    return abs(one - other) > 0.02 * other
 
 
 def _unsettled(

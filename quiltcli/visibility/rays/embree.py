@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from quiltcli.errors import MissingExtraError
-from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, cross, dot
 from quiltcli.viewer.viewer import Viewer
 
 MISS, UNSURE = -1, -2
@@ -43,7 +43,15 @@ class Target:
     named: IntArray
 
 
-def aim(vertices: FloatArray, triangles: Int32Array, viewer: Viewer, backface_culling: bool) -> Target:
+def aim(
+    vertices: FloatArray,
+    triangles: Int32Array,
+    viewer: Viewer,
+    backface_culling: bool,
+    *,
+    one_sided: BoolArray | None = None,
+    invisible: BoolArray | None = None,
+) -> Target:
     """Make a target of a scene.
 
     Args:
@@ -51,6 +59,8 @@ def aim(vertices: FloatArray, triangles: Int32Array, viewer: Viewer, backface_cu
         triangles: (T, 3).
         viewer: the viewer.
         backface_culling: leave out triangles whose winding is clockwise as seen from the eye.
+        one_sided: (T,) the only ones that are left out then, without `backface_culling`; None for none.
+        invisible: (T,) triangles that hold up no light; None for none.
 
     Raises:
         MissingExtraError: there is no Embree on this machine.
@@ -62,15 +72,16 @@ def aim(vertices: FloatArray, triangles: Int32Array, viewer: Viewer, backface_cu
     drawn = np.asarray(normal.any(axis=1))
     if backface_culling:
         drawn &= offset < 0
+    elif one_sided is not None:
+        drawn &= ~one_sided | (offset < 0)
+    if invisible is not None:
+        drawn &= ~invisible
     farthest = viewer.reach_of(corners.T)[triangles].max(axis=1)
     # What ends before near begins would only have to be stepped through.
     named = np.flatnonzero(drawn & (farthest >= viewer.near * (1 - 1e-6)))
     plane = np.concatenate((normal, offset[:, None]), axis=1)
+    demand_embree()
     embree = embree_scene(corners, triangles[named])
-    if embree is None:
-        raise MissingExtraError(
-            "rays are cast with Embree, but embreex is not installed (not every kind of machine has it)"
-        )
     return Target(viewer, corners, triangles, plane, drawn, embree, named)
 
 
@@ -90,6 +101,34 @@ def embree_scene(corners: FloatArray, triangles: Int32Array) -> Any:
         # Embree looks at 32 bits an index and does not check them.
         make_mesh(scene, corners.astype(np.float32), np.ascontiguousarray(triangles, dtype=np.int32))
     return scene
+
+
+def demand_embree(words: str = "rays are cast with Embree") -> None:
+    """Raise where there is no Embree on this machine.
+
+    Args:
+        words: what it is needed for, for the message.
+
+    Raises:
+        MissingExtraError: there is none.
+    """
+    if not has_embree():
+        raise MissingExtraError(f"{words}, but embreex is not installed (not every kind of machine has it)")
+
+
+def is_hidden(scene: Any, origin: Float32Array, direction: Float32Array, far: Float32Array) -> BoolArray:
+    """Whether something lies between origins and ends.
+
+    Args:
+        scene: from `embree_scene`.
+        origin: (N, 3) where rays start.
+        direction: (N, 3) where they go, of any length.
+        far: (N,) multiples of the direction at which they end.
+    """
+    # Of the triangles this query names the first, whichever is in the way.
+    answer: Int32Array = scene.run(origin, direction, dists=far, query="OCCLUDED")
+    hidden: BoolArray = answer == 0
+    return hidden
 
 
 def _embree() -> tuple[Any, Any] | None:

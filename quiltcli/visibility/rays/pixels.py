@@ -28,7 +28,7 @@ class Places:
         page: (P,) 0-based page.
         x: (P,) column.
         y: (P,) row.
-        ray: (P, 3, 3) page pixel (x, y, 1) → direction from the eye.
+        ray: (P, 3, 3) page pixel (x, y, 1) → direction from the eye; on a curved facet each pixel's own.
     """
 
     address: IntArray
@@ -53,4 +53,27 @@ def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRay
     page = layout.page[facet].astype(np.int64)
     width = layout.pages[page, 0].astype(np.int64)
     local = address - layout.page_offset[page]
-    return Places(address, facet, owner < 0, page, local % width, local // width, rays.eye_from_quilt[facet])
+    x, y = local % width, local // width
+    ray = rays.eye_from_quilt[facet]
+    for row, view in enumerate(rays.views):
+        if view is not None:
+            mine = np.flatnonzero(facet == row)
+            if mine.size:
+                ray[mine] = view.matrices(x[mine] + 0.5, y[mine] + 0.5)
+    return Places(address, facet, owner < 0, page, x, y, ray)
+
+
+def lit_pixels(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> BoolArray:
+    """Which pixels (P,) at flat quilt addresses show an image to the eye: all but those on a chart's back."""
+    result = np.ones(address.size, dtype=np.bool_)
+    if not any(view is not None for view in rays.views):
+        return result
+    facet = np.abs(owners[address].astype(np.int64)) - 1
+    for row, view in enumerate(rays.views):
+        mine = np.flatnonzero(facet == row)
+        if view is None or not mine.size:
+            continue
+        page = int(layout.page[row])
+        y, x = np.divmod(address[mine] - layout.page_offset[page], int(layout.pages[page, 0]))
+        result[mine] = view.lit(x + 0.5, y + 0.5)
+    return result

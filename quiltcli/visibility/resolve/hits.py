@@ -163,9 +163,18 @@ class Hits:
         flat = values.reshape(-1)
         return flat if index is None else np.asarray(flat.take(index))
 
-    def put(self, buffer: NDArray[Any], values: NDArray[Any]) -> None:
-        """Write values (G, k), (G, 1) for whole groups, or (1, 1) for all, into a flat buffer of any type."""
+    def put(self, buffer: NDArray[Any], values: NDArray[Any], some: IntArray | None = None) -> None:
+        """Write values (G, k), (G, 1) for whole groups, or (1, 1) for all, into a flat buffer of any type.
+
+        Args:
+            buffer: written to.
+            values: the values.
+            some: the only pixels written to, of all that are drawn; None for all.
+        """
         values = values.astype(buffer.dtype, copy=False)
+        if some is not None:
+            buffer[self.pixel[some]] = self.drawn(values)[some]
+            return
         self.places.put(buffer, values.reshape(-1) if values.size == 1 else self.drawn(values))
 
 

@@ -58,8 +58,31 @@ class MixedTiles:
         return pixel_hits(self.reader, self.tiles, keys, pixel, places, inside)
 
 
+@dataclass(frozen=True)
+class Rays:
+    """Rays of G pixels that are known one by one.
+
+    Attributes:
+        x: (G,) columns in the block at which they go through.
+        y: (G,) rows.
+        vectors: (3, G) rays.
+        depth: (G,) depth of their ends.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    vectors: FloatArray
+    depth: FloatArray
+
+
 def pixel_hits(
-    reader: Reader, tiles: Tiles, keys: IntArray, pixel: IntArray, places: Places, inside: int
+    reader: Reader,
+    tiles: Tiles,
+    keys: IntArray,
+    pixel: IntArray,
+    places: Places,
+    inside: int,
+    known: Rays | None = None,
 ) -> Hits:
     """Hits of pixels of microtiles, each a group of its own.
 
@@ -70,6 +93,7 @@ def pixel_hits(
         pixel: (G,) the pixels, counted through all microtiles; ascending, if they are all of them.
         places: where they lie in the quilt.
         inside: pixels that are not bleed.
+        known: their rays, where these do not go through the pixels' own places.
     """
     # The distinct surfaces that are seen, and which of them each pixel sees.
     planes, wanted = reader.table.planes, reader.wanted
@@ -85,13 +109,21 @@ def pixel_hits(
         return values if complete else values.take(pixel, axis=-1)
 
     # The ray's multiple t at which it meets the surface is its plane's 1/t, inverted.
-    x, y = (
-        chosen(tiles.x.astype(np.float32)[:, None] + _DX),
-        chosen(tiles.y.astype(np.float32)[:, None] + _DY),
-    )
-    inverse = _inverse(planes, rows, which, x.astype(np.float64), y.astype(np.float64))[:, None]
-    rays = rays_through(reader, tiles)
-    depth, position = rays.values()
+    if known is None:
+        x, y = (
+            chosen(tiles.x.astype(np.float32)[:, None] + _DX),
+            chosen(tiles.y.astype(np.float32)[:, None] + _DY),
+        )
+        inverse = _inverse(planes, rows, which, x.astype(np.float64), y.astype(np.float64))[:, None]
+        rays = rays_through(reader, tiles)
+        depth, position = rays.values()
+        depth, vectors = chosen(depth), chosen(vector_values(rays.vectors))
+        position = None if position is None else chosen(position)
+    else:
+        x, y = known.x.astype(np.float32), known.y.astype(np.float32)
+        inverse = _inverse(planes, rows, which, known.x, known.y)[:, None]
+        depth, vectors = known.depth, known.vectors.astype(np.float32)
+        position = known.vectors if Wanted.POSITION in wanted else None
     # Attributes: numerators that are linear over the pixels, by the sum of the edge functions.
     normal = weights = None
     if Wanted.NORMAL in wanted:
@@ -104,17 +136,18 @@ def pixel_hits(
         planes_of = edge_planes_of(
             planes, rows, x0, y0, reader.cells, reader.facet_of(planes.block.take(rows))
         )
-        edges = PixelEdges(planes_of, which, x.astype(np.float64), y.astype(np.float64), x0, y0)
+        exact_x, exact_y = (x, y) if known is None else (known.x, known.y)
+        edges = PixelEdges(planes_of, which, exact_x.astype(np.float64), exact_y.astype(np.float64), x0, y0)
     return Hits(
         places=places,
         chosen=None,
         facet=chosen(np.broadcast_to(tiles.facet[:, None], (tiles.facet.size, 64))),
         triangle=seen.triangle.take(which),
-        ray=PointVectors(chosen(vector_values(rays.vectors))[:, :, None]),
-        depth=chosen(depth)[:, None] / inverse,
+        ray=PointVectors(vectors[:, :, None]),
+        depth=depth[:, None] / inverse,
         normal=normal,
         weights=weights,
-        position=None if position is None else chosen(position)[:, :, None] / inverse,
+        position=None if position is None else position[:, :, None] / inverse,
         inside=inside,
         edges=edges,
     )

@@ -65,11 +65,13 @@ def draw_large(
     Returns:
         Number of pixels that were evaluated.
     """
+    # By another order than 1/t nothing is known to hide anything: all is evaluated.
     drawn = 0
     if covering is not None:
+        # What small triangles drew, and what covers a microtile, hides spans as a whole.
         least = least_keys(canvas)
         np.greater(least, 0, out=canvas.full)
-        spans = _not_behind(spans, np.maximum(least, covering), bits)
+        spans = not_behind(spans, np.maximum(least, covering), bits)
         spans = spans.take(np.flatnonzero(~_behind_cover(planes, spans, covering, bits)))
         spans = _fill(planes, spans, canvas)
         # Backs and walls come last: pieces of other surfaces may hide them together.
@@ -77,14 +79,15 @@ def draw_large(
         first, spans = spans.take(np.flatnonzero(~last)), spans.take(np.flatnonzero(last))
         _draw_rounds(planes, first, canvas, limits, bits, by)
         drawn = first.row.size
+        # Only where something is left need the least keys be found again.
         left = np.zeros(canvas.touched.size, dtype=np.bool_)
         left[spans.tile] = True
-        spans = _not_behind(spans, least_keys(canvas, left), bits)
+        spans = not_behind(spans, least_keys(canvas, left), bits)
     _draw_rounds(planes, spans, canvas, limits, bits, by)
     return (drawn + spans.row.size) * MICROTILE * MICROTILE
 
 
-def _not_behind(spans: Spans, least: IntArray, bits: int) -> Spans:
+def not_behind(spans: Spans, least: IntArray, bits: int) -> Spans:
     """The spans that are not wholly behind the `least` keys (M,) that the pixels of their microtiles have."""
     return spans.take(np.flatnonzero(spans.greatest >= depth_part(least, bits).take(spans.tile)))
 
@@ -95,12 +98,14 @@ def _behind_cover(planes: Planes, spans: Spans, covering: IntArray, bits: int) -
     So does the far side of a thin wall, though somewhere in the microtile it is nearer than the near
     side is elsewhere.
     """
+    # The pair that covers a microtile is told by the serial in its key.
     result = np.zeros(spans.row.size, dtype=np.bool_)
     key = covering.take(spans.tile)
     some = np.flatnonzero(key)
     row_of_serial = np.empty(int(planes.serial.max(initial=0)) + 1, dtype=np.int64)
     row_of_serial[planes.serial] = np.arange(planes.serial.size)
     cover, row = row_of_serial.take(serial_of(key.take(some), bits)), spans.row.take(some)
+    # The difference of two planes of 1/t is a plane: its greatest value is at a corner.
     behind = np.take(planes.inverse, row, axis=1)
     behind -= (1 - _CLEARLY) * np.take(planes.inverse, cover, axis=1)
     a, b, c = moved(spans.x.take(some), spans.y.take(some), out=behind)
@@ -113,6 +118,7 @@ def _behind_cover(planes: Planes, spans: Spans, covering: IntArray, bits: int) -
 
 def _fill(planes: Planes, spans: Spans, canvas: Canvas) -> Spans:
     """Note the microtiles that have nothing but one pair that fills them; the spans of all others."""
+    # Alone: one span, and nothing that small triangles have drawn.
     count = np.bincount(spans.tile, minlength=canvas.touched.size)
     count += canvas.touched
     alone = (count.take(spans.tile) == 1) & (spans.crossed == 0) & ~planes.cut.take(spans.row)
@@ -126,22 +132,24 @@ def _draw_rounds(
 ) -> None:
     """Evaluate the microtiles' pixels, in rounds in which every microtile occurs once."""
     canvas.touched[spans.tile] = True
-    group, order = _rounds(spans)
+    group, order = rounds(spans)
     spans = spans.take(order)
     bounds = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
     for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
         for part in slices(first, last, _ROUND):
+            # No microtile twice: reading, comparing and writing back loses nothing.
             few = spans[part]
             keys = canvas.keys.take(few.tile, axis=0)
-            canvas.keys[few.tile] = np.maximum(keys, _tile_keys(planes, few, limits, bits, by), out=keys)
+            canvas.keys[few.tile] = np.maximum(keys, tile_keys(planes, few, limits, bits, by), out=keys)
 
 
-def _rounds(spans: Spans) -> tuple[IntArray, IntArray]:
+def rounds(spans: Spans) -> tuple[IntArray, IntArray]:
     """Numbers of groups (S,) to be evaluated together, ascending, and the spans in their order (S,).
 
     In a group no microtile comes twice, and, but for the late rounds, the same edges cross all: few
     spans are left then, and one evaluation for all costs less than several.
     """
+    # The rank of a span among those of its microtile is its round.
     by_tile = _sorted_order(spans.tile)
     tile = spans.tile[by_tile]
     fresh = np.flatnonzero(np.diff(tile, prepend=-1))
@@ -154,16 +162,16 @@ def _rounds(spans: Spans) -> tuple[IntArray, IntArray]:
 
 def _sorted_order(values: IntArray) -> IntArray:
     """The order (S,) that sorts small whole numbers; equal ones stay as they are."""
+    # With its place in the lower half every number is another, so the fastest sort is stable, too.
     packed = values << 32 | np.arange(values.size)
     packed.sort()
     packed &= 0xFFFFFFFF
     return packed
 
 
-def _tile_keys(
-    planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None
-) -> IntArray:
+def tile_keys(planes: Planes, spans: Spans, limits: DepthRange, bits: int, by: BatchOrder | None) -> IntArray:
     """Keys (S, 64) of some microtiles; negative where they are not covered."""
+    # Edges that cross none of these microtiles are not evaluated at all.
     row, x, y = spans.row, spans.x, spans.y
     crossed = int(np.bitwise_or.reduce(spans.crossed))
 
@@ -181,6 +189,7 @@ def _tile_keys(
     if cut.any():
         kept = limits.keeps(planes.block.take(row)[:, None], x[:, None] + _X, y[:, None] + _Y, inverse)
         np.negative(inverse, out=inverse, where=~kept & cut[:, None])
+    # The sign tells covered from not, the size how near: one number for both.
     if edges:
         np.copysign(inverse, np.minimum(inverse, edges[0], out=edges[0]), out=inverse)
     if by is not None:

@@ -2,11 +2,21 @@
 
 Triangles are sorted into classes of box sizes; inside a class all boxes have one shape, so the edge
 functions of thousands of triangles are evaluated by a few broadcasts over (rows, columns, triangles).
+
+    boxes of three pairs        their class, 4 × 3          keys of the block
+    ┌─────┐ ┌───┐ ┌───────┐     ┌───────┐  x, y begin       ┌───────┬───────┐
+    │  ╱╲ │ │╲  │ │╱‾‾‾‾‾╱│  →  │· ■ ■ ·│  at each pair's   │       │  ■ ■  │  the greatest
+    │ ╱__╲│ │_╲ │ │____╱  │     │■ ■ ■ ■│  own first pixel  │     ■ │■ ■ ■  │  stays, whoever
+    └─────┘ └───┘ └───────┘     │■ ■ ■ ·│               →   └───────┴───────┘  comes first
+                                └───────┘
+
 Those that face the eye come first. Most of the others lie behind them, which one look at the
 microtiles under their boxes tells, before their planes are made.
 """
 
 from __future__ import annotations
+
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +30,8 @@ from quiltcli.visibility.setup.planes import Planes, PlaneTable, Warped, depth_b
 
 SIZES = (2, 3, 4, 6, 8, 12)
 LIMIT = SIZES[-1]
+Candidates: TypeAlias = tuple[IntArray, IntArray]
+"""Addresses and depth keys of fragments."""
 _RUN = 1 << 16
 _CANDIDATES = 1 << 16
 _SHAPES = len(SIZES) ** 2
@@ -92,8 +104,10 @@ def draw_small(
     Returns:
         Number of candidate pixels that were evaluated.
     """
+    # What surely lies behind a larger triangle need not be set up.
     if covering is not None and np.count_nonzero(covering) * _SOME > covering.size:
         rows = rows[~_hidden(pairs, rows, covering, canvas, bits)]
+    # Fronts first: the backs of closed bodies, and more besides, are hidden by them then.
     front, back = rows, rows[:0]
     if not culled:
         behind = seen_from_behind(pairs.corners, limits.handed.take(pairs.block)).take(rows)
@@ -104,6 +118,25 @@ def draw_small(
     return candidates + _draw(pairs, back, table, canvas, limits, bits, by)
 
 
+def candidates_of(
+    pairs: Warped,
+    rows: IntArray,
+    table: PlaneTable,
+    canvas: Canvas,
+    limits: DepthRange,
+    bits: int,
+    by: BatchOrder | None,
+) -> list[Candidates]:
+    """Addresses and keys of all fragments of pairs that lie before what is drawn; the canvas stays as it is.
+
+    Arguments as for `draw_small`.
+    """
+    found: list[Candidates] = []
+    if rows.size:
+        _draw(pairs, rows, table, canvas, limits, bits, by, found)
+    return found
+
+
 def _draw(
     pairs: Warped,
     rows: IntArray,
@@ -112,14 +145,16 @@ def _draw(
     limits: DepthRange,
     bits: int,
     by: BatchOrder | None,
+    into: list[Candidates] | None = None,
 ) -> int:
-    """Draw pairs by classes; the number of candidate pixels."""
+    """Draw pairs by classes, or gather their fragments; the number of candidate pixels."""
+    # Classes side by side, and a run of them set up at a time: its planes stay in the cache.
     classes = size_classes(pairs, rows)
     order = np.argsort(classes, kind="stable")
     candidates = 0
     for part in slices(0, order.size, _RUN):
         run = order[part]
-        candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by)
+        candidates += _draw_run(table.add(pairs, rows[run]), classes[run], canvas, limits, bits, by, into)
     return candidates
 
 
@@ -134,8 +169,10 @@ def _hidden(pairs: Warped, rows: IntArray, nearest: IntArray, canvas: Canvas, bi
         bits: bits of the serial in a key.
     """
     block = pairs.block.take(rows)
+    # Boxes that lie on at most four microtiles, and so have one under each corner, can be told.
     x0, x1, y0, y1 = (np.take(pairs.box, rows, axis=1) >> 3).astype(np.int64)
     across, start = canvas.tiles_across.take(block), canvas.tile_start.take(block)
+    # The nearest a pair can be, with the best serial: a key that none of its pixels exceeds.
     _, high = depth_bounds(np.stack([corner[2].take(rows) for corner in pairs.corners]))
     front = high.view(np.int64) | np.int64((1 << bits) - 1)
     upper, lower = start + y0 * across, start + y1 * across
@@ -153,8 +190,10 @@ def _draw_run(
     limits: DepthRange,
     bits: int,
     by: BatchOrder | None,
+    into: list[Candidates] | None,
 ) -> int:
     """Draw pairs sorted by class (N,); the number of candidate pixels."""
+    # A number that is no class begins and ends the row, so that every class has two bounds.
     bounds = np.flatnonzero(np.diff(classes, prepend=np.uint16(65535), append=np.uint16(65535)))
     candidates = 0
     for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
@@ -162,7 +201,7 @@ def _draw_run(
         height, width = SIZES[shape // len(SIZES)], SIZES[shape % len(SIZES)]
         candidates += (last - first) * width * height
         for part in slices(first, last, _CANDIDATES // (width * height)):
-            _draw_boxes(planes[part], (height, width), canvas, limits if cut else None, bits, by)
+            _draw_boxes(planes[part], (height, width), canvas, limits if cut else None, bits, by, into)
     return candidates
 
 
@@ -173,8 +212,9 @@ def _draw_boxes(
     limits: DepthRange | None,
     bits: int,
     by: BatchOrder | None,
+    into: list[Candidates] | None,
 ) -> None:
-    """Draw pairs whose boxes all have this (height, width)."""
+    """Draw pairs whose boxes all have this (height, width), or gather their fragments."""
     height, width = shape
     block = planes.block
     # Numbers of 32 bits are enough for addresses in a batch, and half the memory.
@@ -186,9 +226,11 @@ def _draw_boxes(
     x = np.minimum(planes.box[0], across * 8 - width) + np.arange(width, dtype=np.int32)[:, None]
     y = np.minimum(planes.box[2], down * 8 - height) + np.arange(height, dtype=np.int32)[:, None]
     fx, fy = x.astype(np.float64), y.astype(np.float64)
+    # Inside is where the least of three edge functions is positive.
     inside = _evaluate(planes.edge[0], fx, fy)
     for k in (1, 2):
         np.minimum(inside, _evaluate(planes.edge[k], fx, fy), out=inside)
+    # A sliver's plane of 1/t is steep: off its corners' range it would be noise.
     inverse = _evaluate(planes.inverse, fx, fy)
     np.maximum(inverse, planes.low, out=inverse)
     np.minimum(inverse, planes.high, out=inverse)
@@ -198,16 +240,22 @@ def _draw_boxes(
     drawn = np.flatnonzero(covered)
     if by is not None:
         inverse = by.values(block, fx[None, :, :], fy[:, None, :], inverse)
+    # Within a row of microtiles the next one is 64 keys on, not 8; the row below begins after all of them.
     column = x + (x >> 3) * 56
     row = (y >> 3) * (across * 64) + (y & 7) * 8 + start * 64
     address = (row[:, None, :] + column).ravel().take(drawn).astype(np.int64)
     keys = make_keys(serial_part(planes.serial, bits), bits, out=inverse).ravel().take(drawn)
+    if into is not None:
+        front = keys > np.maximum(canvas.keys.reshape(-1).take(address), 0)
+        into.append((address[front], keys[front]))
+        return
     np.maximum.at(canvas.keys.reshape(-1), address, keys)
     canvas.touched[address >> 6] = True
 
 
 def _evaluate(plane: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     """Values (height, width, n) of planes (3, n) at columns x (width, n) and rows y (height, n)."""
+    # What depends on the row alone is summed first, in the order in which sums are exact.
     rows = plane[1] * y
     rows += plane[2]
     result: FloatArray = rows[:, None, :] + plane[0] * x

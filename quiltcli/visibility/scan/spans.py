@@ -81,15 +81,16 @@ class Spans:
         return Spans(*(column.take(keep) for column in vars(self).values()))
 
 
-def large_spans(planes: Planes, canvas: Canvas, by: BatchOrder | None = None) -> Spans:
+def large_spans(planes: Planes, canvas: Canvas, by: BatchOrder | None = None, *, hide: bool = True) -> Spans:
     """The microtiles that pairs of any size may show in.
 
     Args:
         planes: the pairs.
         canvas: the microtiles.
         by: what to order by instead of 1/t; tiles of pairs that lie behind others are not left out then.
+        hide: whether those are left out otherwise.
     """
-    return _spans(planes, _pieces(planes, by is None), canvas)
+    return _spans(planes, _pieces(planes, hide and by is None), canvas)
 
 
 def _pieces(planes: Planes, hide: bool) -> Pieces:
@@ -141,7 +142,7 @@ def _behind(planes: Planes, row: IntArray, x: IntArray, y: IntArray, covered: Bo
     """Which pairs lie, in a tile at x, y (S,), wholly behind one that covers it."""
     least, greatest = _extremes(np.take(planes.inverse, row, axis=1), x, y)
     low, high = planes.low.take(row), planes.high.take(row)
-    least, greatest = _held(least, low, high), _held(greatest, low, high)
+    least, greatest = held(least, low, high), held(greatest, low, high)
     per_block = (SIDE // TILE) ** 2
     place = planes.block.take(row) * np.int64(per_block) + y // TILE * (SIDE // TILE) + x // TILE
     nearest = np.zeros(int(place.max(initial=-1)) + 1)
@@ -151,7 +152,7 @@ def _behind(planes: Planes, row: IntArray, x: IntArray, y: IntArray, covered: Bo
     return result
 
 
-def _held(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+def held(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Values of 1/t (S,) held between those of the corners, as they are where they are drawn."""
     return np.minimum(np.maximum(values, low, out=values), high, out=values)
 
@@ -217,8 +218,8 @@ def _class_spans(
         x=x * MICROTILE,
         y=y * MICROTILE,
         crossed=crossed.ravel().take(keep),
-        least=_held(values + down.take(piece), low, high),
-        greatest=_held(values + up.take(piece), low, high),
+        least=held(values + down.take(piece), low, high),
+        greatest=held(values + up.take(piece), low, high),
     )
 
 

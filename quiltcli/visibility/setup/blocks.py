@@ -3,6 +3,15 @@
 A block is a part of one facet's rectangle on its page, at most `SIDE` pixels wide and high, so that
 pixel coordinates inside it stay small (edge functions are exact there) and its depth keys fit the
 cache. Keys are kept in microtiles: 8 × 8 pixels that are 64 neighbours in memory.
+
+    page                            a block                  its keys
+    ┌───────────────────────┐       ┌────┬────┬────┐         0 … 63 | 64 … 127 | 128 … 191
+    │   ╱‾‾╲     facet      │       │ 0  │ 1  │ 2  │         └ microtile 0, row by row
+    │ ┌╱────╲─┬────┐        │       ├────┼────┼────┤
+    │ ╱│     │╲    │        │  →    │ 3  │ 4  │ 5  │         owned: a bit for each pixel that
+    │╱_│_____│_╲___│ blocks │       └────┴────┴────┘         is the facet's or its bleed
+    └─┴┴─────┴─────┴────────┘        8 × 8 pixels each
+      └ a column that is a multiple of 8
 """
 
 from __future__ import annotations
@@ -22,6 +31,7 @@ T = TypeVar("T", bound=np.generic)
 SIDE = 512
 BATCH_PIXELS = 1 << 21
 BATCH_PAIRS = 1 << 17
+PATCH_PIXELS = 1 << 19
 _LEAST_PIXELS = 1 << 20
 _SHARES = 3  # of a worker, if they do not get too small, so that none waits long for the last
 _NOT_SEEN = np.float64(np.inf).view(np.int64)
@@ -49,6 +59,8 @@ class Blocks:
         used: (microtiles,) those that have pixels of the facet or its bleed.
         owned: (microtiles, 8) uint8, bits of the pixels that are the facet's or its bleed, row by row.
         inside: (microtiles, 8) uint8, bits of those that lie in the facet.
+        flat: how many of the blocks are flat facets'; behind them, each a row of `start` of its own, come the
+            patches of curved ones.
     """
 
     start: IntArray
@@ -67,6 +79,7 @@ class Blocks:
     used: BoolArray
     owned: NDArray[np.uint8]
     inside: NDArray[np.uint8]
+    flat: int
 
     def tiles(self, blocks: tuple[int, int]) -> slice:
         """The microtiles of a range of blocks."""
@@ -81,6 +94,7 @@ class Blocks:
 
 def facet_rectangles(layout: Layout, bleed: int) -> IntArray:
     """Pixel rectangles (F, 4) x0, y0, x1, y1 (exclusive) of the facets with their bleed, cut to the page."""
+    # Whole pixels around the polygon and its bleed; a facet without a page has none.
     corners = quilt_polygons(layout)
     low = np.minimum.reduceat(corners, layout.corner_start[:-1], axis=0)
     high = np.maximum.reduceat(corners, layout.corner_start[:-1], axis=0)
@@ -140,6 +154,7 @@ def cut_blocks(layout: Layout, bleed: int, owners: OwnerArray) -> Blocks:
         used=np.asarray(owned.any(axis=1)),
         owned=owned,
         inside=inside,
+        flat=facet.size,
     )
 
 
@@ -168,15 +183,16 @@ def _owned_pixels(
     """Which pixels of all blocks' microtiles their facets own, and which of them are no bleed, as bits."""
     owned, inside = [np.zeros((0, 8), dtype=np.uint8)], [np.zeros((0, 8), dtype=np.uint8)]
     for f, w, h, first, step in zip(facet, width, height, address, stride, strict=True):
+        # Made up to whole microtiles with pixels of nobody.
         mine = np.zeros((-(-h // 8) * 8, -(-w // 8) * 8), dtype=owners.dtype)
         mine[:h, :w] = window(owners, first, step, w, h)
         polygon = mine == f + 1
-        owned.append(_tile_bits(polygon | (mine == -f - 1)))
-        inside.append(_tile_bits(polygon))
+        owned.append(tile_bits(polygon | (mine == -f - 1)))
+        inside.append(tile_bits(polygon))
     return np.concatenate(owned), np.concatenate(inside)
 
 
-def _tile_bits(mask: BoolArray) -> NDArray[np.uint8]:
+def tile_bits(mask: BoolArray) -> NDArray[np.uint8]:
     """A mask of whole microtiles as bits (microtiles, 8), row by row."""
     rows = np.packbits(mask, axis=1)
     return rows.reshape(len(mask) // 8, 8, -1).transpose(0, 2, 1).reshape(-1, 8)
@@ -208,7 +224,11 @@ def cut_batches(
     batches = []
     first, begun, pixels, pairs = 0, False, 0, 0
     for block in np.flatnonzero(wanted).tolist():
-        if begun and (pixels + area[block] > most or pairs + counts[block] > BATCH_PAIRS):
+        full = pixels + area[block] > most or pairs + counts[block] > BATCH_PAIRS
+        # What is curved is drawn in another way, with more to remember of each pixel.
+        if begun and (
+            full or first < blocks.flat <= block or (first >= blocks.flat and pixels > PATCH_PIXELS)
+        ):
             batches.append((first, block))
             first, pixels, pairs = block, 0, 0
         begun = True
@@ -293,12 +313,14 @@ _SPARE = _Spare()
 
 def _empty_keys(count: int) -> IntArray:
     """Keys (count, 64) that are 0."""
+    # Taken out of the shelf: two canvases of one thread must not have the same.
     keys, _SPARE.keys = _SPARE.keys, None
     return keys[:count] if keys is not None and len(keys) >= count else np.zeros((count, 64), dtype=np.int64)
 
 
 def give_back(canvas: Canvas) -> None:
     """Keep the memory of a canvas that nobody reads any more for the next one."""
+    # What is kept is the whole array, of which this canvas may have been a part.
     canvas.keys[canvas.touched] = 0
     _SPARE.keys = canvas.keys if canvas.keys.base is None else canvas.keys.base
 
@@ -310,6 +332,7 @@ def least_keys(canvas: Canvas, among: BoolArray | None = None) -> IntArray:
         canvas: what has been drawn.
         among: (M,) the only microtiles that are looked at, None for all; others are told to have 0.
     """
+    # Nothing can be in front of microtiles that have no pixels; untouched ones hide nothing.
     least = np.zeros(canvas.touched.size, dtype=np.int64)
     least[~canvas.used] = _NOT_SEEN
     touched = np.flatnonzero(canvas.touched if among is None else canvas.touched & among)
@@ -326,6 +349,7 @@ def ray_matrices(
     eye_from_quilt: FloatArray, blocks: Blocks, block: IntArray, sample: FloatArray | None
 ) -> FloatArray:
     """Matrices (K, 3, 3) from block pixels, whole numbers at each facet's `sample` (F, 2), to eye rays."""
+    # The first pixel's sample is moved to the origin, and pixels are whole numbers from there.
     facet = blocks.facet[block]
     matrix = eye_from_quilt[facet].copy()
     beside = np.zeros((1, 2)) if sample is None else sample[facet]

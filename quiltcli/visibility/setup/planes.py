@@ -2,7 +2,15 @@
 
 In the homogeneous pixels (X, Y, W) of a block, a triangle's three edge functions and its inverse
 depth 1/t are linear in the pixel (x, y, 1); no clipping and no division comes before them
-(Olano & Greer 1997). Their coefficients are put on grids of powers of two so that
+(Olano & Greer 1997).
+
+            C                 edge A = B × C      0 on the line through B and C, positive on A's side
+          ╱   ╲               1/t    = n / det    n = (B − A) × (C − A): the triangle's plane
+        ╱   ·   ╲             ·      covered where all three edges are positive,
+      ╱  (x, y)   ╲                  at depth t = 1 / (a·x + b·y + c)
+     A ─────────── B
+
+Their coefficients are put on grids of powers of two so that
 `a·x + b·y + c` is exact in float64 whatever the order of the sums: two triangles that share an edge
 then decide every pixel alike, and every machine computes the same bytes.
 """
@@ -105,7 +113,7 @@ class PlaneTable:
             cut=np.empty(capacity, dtype=np.bool_),
         )
 
-    def add(self, pairs: Warped, chosen: IntArray) -> Planes:
+    def add(self, pairs: Warped, chosen: IntArray, grids: Grids | None = None) -> Planes:
         """Set up the `chosen` pairs in the table's next rows; a triangle seen edge-on covers nothing."""
         first, self._filled = self._filled, self._filled + chosen.size
         rows = self.planes[first : self._filled]
@@ -115,7 +123,7 @@ class PlaneTable:
             np.take(getattr(pairs, name), chosen, out=getattr(rows, name), mode="clip")
         np.take(pairs.box, chosen, axis=1, out=rows.box, mode="clip")
         corners = np.take(pairs.corners, chosen, axis=2)
-        edge_planes(corners, rows.edge, rows.inverse, rows.turn)
+        edge_planes(corners, rows.edge, rows.inverse, rows.turn, grids or WHOLE)
         rows.low[:], rows.high[:] = depth_bounds(corners[:, 2])
         return rows
 
@@ -131,6 +139,7 @@ def project(corners: FloatArray, matrix: FloatArray, result: FloatArray) -> Floa
     Returns:
         `result`.
     """
+    # Written out: a matrix product sums in an order of its own, another on every machine.
     x, y, z = corners[:, 0], corners[:, 1], corners[:, 2]
     part = np.empty_like(x)
     for row in range(3):
@@ -145,25 +154,28 @@ def pixel_boxes(
     homogeneous: FloatArray,
     width: IntArray | FloatArray,
     height: IntArray | FloatArray,
-    reach: float = 0.0,
+    reach: float | tuple[FloatArray, FloatArray] = 0.0,
 ) -> Int32Array:
     """Bounding boxes (4, N) first/last column, first/last row of the pixels a triangle may cover.
 
-    Samples lie at most `reach` pixels beside a pixel's centre, to either side.
+    Samples lie at most `reach` pixels beside a pixel's centre, to either side; or (N,) across and down.
 
     A triangle that reaches behind the eye may cover all of the block; one wholly behind it, or
     beside the block, has an empty box (last < first).
     """
+    # Corners ahead of the eye are divided; of others the box is told by what is said above.
     w = homogeneous[:, 2]
     least, greatest = _extremes(w)
     front = least > _TINY
     all_front = bool(front.all())
     scale = np.reciprocal(w if all_front else np.where(w > _TINY, w, 1.0))
     box = np.empty((4, w.shape[1]), dtype=np.int32)
-    for axis, extent in ((0, width), (1, height)):
+    across, down = reach if isinstance(reach, tuple) else (reach, reach)
+    for axis, extent, beside in ((0, width, across), (1, height, down)):
+        # A pixel is a candidate when its centre, a whole number here, lies between the extremes.
         first, last = _extremes(homogeneous[:, axis] * scale)
-        np.ceil(np.subtract(first, reach + 1e-6, out=first), out=first)
-        np.floor(np.add(last, reach + 1e-6, out=last), out=last)
+        np.ceil(np.subtract(first, beside + 1e-6, out=first), out=first)
+        np.floor(np.add(last, beside + 1e-6, out=last), out=last)
         if not all_front:
             first = np.where(front, first, 0.0)
             last = np.where(front, last, np.where(greatest > 0, extent - 1.0, -1.0))
@@ -179,7 +191,31 @@ def _extremes(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.minimum(least, c, out=least), np.maximum(greatest, c, out=greatest)
 
 
-def edge_planes(homogeneous: FloatArray, edge: FloatArray, inverse: FloatArray, turn: FloatArray) -> None:
+@dataclass(frozen=True)
+class Grids:
+    """Where samples lie, and so how fine planes may be for sums over them to be exact.
+
+    Attributes:
+        sample: the step of the grid that samples lie on, pixels.
+        edge: the step of edge planes' coefficients, of the larger slope's power of two.
+        inverse: the step of the plane of 1/t, of its greatest value's power of two in a block.
+    """
+
+    sample: float
+    edge: float
+    inverse: float
+
+
+WHOLE = Grids(1.0, 2.0**-34, 2.0**-49)
+"""Samples at whole pixels."""
+
+DISPLACED = Grids(2.0**-16, 2.0**-24, 2.0**-36)
+"""Samples anywhere, on a grid of 65,536 steps a pixel: 25 bits of a slope and 25 of a place give 50."""
+
+
+def edge_planes(
+    homogeneous: FloatArray, edge: FloatArray, inverse: FloatArray, turn: FloatArray, grids: Grids = WHOLE
+) -> None:
     """Edge functions and inverse depth of triangles in homogeneous pixels.
 
     Args:
@@ -188,22 +224,26 @@ def edge_planes(homogeneous: FloatArray, edge: FloatArray, inverse: FloatArray, 
             positive inside; all zero for a triangle seen edge-on.
         inverse: (3, N) is given the plane of 1/t.
         turn: (N,) is given the sign of the determinant, by which the edge functions were multiplied.
+        grids: where samples lie.
     """
     p, q, r = homogeneous
+    # The normal of the triangle's plane; with a corner it gives the determinant A·(B × C).
     _cross(q - p, r - p, inverse)
     determinant = p[0] * inverse[0]
     determinant += p[1] * inverse[1]
     determinant += p[2] * inverse[2]
     np.sign(determinant, out=turn)
+    # A shared edge has the same two corners, in one order or the other: the same numbers, or negated.
     for k, (start, end) in enumerate(((q, r), (r, p), (p, q))):
         _cross(start, end, edge[k])
     edge *= turn
-    snap_edges(edge)
+    snap_edges(edge, grids)
+    # Seen edge-on: all edges are 0 by now, and nothing is covered.
     determinant[turn == 0] = 1.0
     inverse /= determinant
     # Depth is measured at the place itself; only what covers it is decided on the shifted lattice.
     inverse[2] -= LATTICE[0] * inverse[0] + LATTICE[1] * inverse[1]
-    _snap_inverse(inverse)
+    _snap_inverse(inverse, grids)
 
 
 def depth_bounds(w: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -244,30 +284,33 @@ def power_of_two(x: NDArray[Any]) -> FloatArray:
     return result
 
 
-def snap_edges(edge: FloatArray) -> None:
+def snap_edges(edge: FloatArray, grids: Grids = WHOLE) -> None:
     """Put edge planes (..., 3, N) on their dyadic grids and fold the tie rule into c, in place.
 
-    The grid's step is 2⁻³⁴ of the larger slope, so sums over pixels below 2¹³ are exact. The half
-    step added to c settles pixels exactly on the edge by the signs of a and b (a top-left rule);
-    the neighbour's negated plane gets the negated half step.
+    For samples at whole pixels the grid's step is 2⁻³⁴ of the larger slope, so sums over pixels below 2¹³
+    are exact. Half a step of the sums, added to c, settles pixels exactly on the edge by the signs of a and b
+    (a top-left rule); the neighbour's negated plane gets the negated half step.
     """
     a, b, c = edge[..., 0, :], edge[..., 1, :], edge[..., 2, :]
+    # Adding 1.5·2⁵² steps rounds to whole steps, and taking that away leaves them.
     scale = power_of_two(np.maximum(np.abs(a), np.abs(b)))
-    round_to = (scale * (1.5 * 2.0**18))[..., None, :]
+    round_to = (scale * (1.5 * 2.0**52 * grids.edge))[..., None, :]
     edge += round_to
     edge -= round_to
+    # The sign of a, or of b where a is 0: b's share is smaller than any step of a.
     tie = b * 2.0**-44
     tie += a
-    scale *= 2.0**-35
+    scale *= grids.edge * grids.sample / 2
     c += np.copysign(scale, tie, out=tie)
 
 
-def _snap_inverse(plane: FloatArray) -> None:
+def _snap_inverse(plane: FloatArray, grids: Grids) -> None:
     """Put a plane of 1/t (3, N) on a grid on which sums over a block are exact, in place."""
+    # The greatest value within a block of 512 pixels decides the step, as for edges.
     a, b, c = plane
     slope = np.maximum(np.abs(a), np.abs(b))
     slope *= 512.0
     scale = power_of_two(np.maximum(slope, np.abs(c), out=slope))
-    scale *= 1.5 * 2.0**3
+    scale *= 1.5 * 2.0**52 * grids.inverse
     plane += scale
     plane -= scale

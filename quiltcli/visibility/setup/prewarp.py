@@ -31,12 +31,14 @@ class Sight:
         triangles: (T, 3).
         cut: (T,) triangles that reach beyond the near or far depth.
         culled: whether triangles that face away have been left out.
+        soft: (T,) triangles that light may pass; None where there are none.
     """
 
     vertices: FloatArray
     triangles: Int32Array
     cut: BoolArray
     culled: bool = False
+    soft: BoolArray | None = None
 
 
 @dataclass(frozen=True)
@@ -205,6 +207,7 @@ def warp(
     blocks: Blocks,
     block: IntArray,
     matrices: FloatArray,
+    reach: FloatArray | float = 0.0,
 ) -> Warped:
     """The pairs of some blocks in homogeneous pixels, in the order of `block_pairs`.
 
@@ -214,6 +217,8 @@ def warp(
         blocks: the blocks.
         block: (K,) the blocks of the batch, ascending.
         matrices: (K, 3, 3) from `block_matrices`.
+        reach: pixels by which samples lie beside the centres of their pixels, at most: (K, 2), a row a block,
+            or for all.
     """
     triangle, place = block_pairs.of(block)
     matrices = np.ascontiguousarray(matrices.transpose(1, 2, 0))
@@ -226,6 +231,10 @@ def warp(
         world = gather_corners(sight.vertices, sight.triangles.take(triangle[part], axis=0))
         project(world, np.take(matrices, place[part], axis=2), corners[:, :, part])
         width, height = (size.take(place[part]) for size in extent)
-        box[:, part] = pixel_boxes(corners[:, :, part], width, height)
+        if isinstance(reach, np.ndarray):
+            beside = reach[:, 0].take(place[part]), reach[:, 1].take(place[part])
+            box[:, part] = pixel_boxes(corners[:, :, part], width, height, beside)
+        else:
+            box[:, part] = pixel_boxes(corners[:, :, part], width, height, reach)
         np.maximum(box[0, part], margin.take(place[part]), out=box[0, part])
     return Warped(triangle, place.astype(np.int32), corners, box, sight.cut.take(triangle))

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from quiltcli.errors import QuiltError
 from quiltcli.job import PathSpec, RecordedSpec, ViewerSpec
-from quiltcli.viewer.recorded.head import Head, read_head
+from quiltcli.viewer.recorded.head import Head, read_head, take_notices
 from quiltcli.viewer.viewer import Viewer, viewer_at
 
 RATE = 100.0
@@ -149,6 +149,51 @@ def test_a_sample_that_jumps_away_and_back_is_lost(tmp_path: Path) -> None:
     assert at(spec, 21).eye == pytest.approx(places[20], abs=1e-12)
 
 
+def test_a_sample_that_is_turned_away_alone_is_lost(tmp_path: Path) -> None:
+    times, places = walk(41)
+    angles = np.stack((40 * times, np.zeros(41), np.zeros(41)), axis=1)
+    angles[20, 1] = 120  # a swapped marker, in one sample
+    head = head_of(tmp_path, rows(times, places, Rotation.from_euler("yxz", angles, degrees=True)))
+    assert head.cleaned.spikes == pytest.approx([0.2])
+    assert head.cleaned.turns.size == 0
+    (notice,) = take_notices(spec_of(tmp_path, (tmp_path / "take.csv").read_text()))
+    assert notice.endswith(
+        "take.csv: 1 sample left out, the first at second 0.200: away from all others and back at once"
+    )
+    spec = spec_of(tmp_path, (tmp_path / "take.csv").read_text(), filter={"kind": "none"})
+    look = at(spec, 21).look  # straight along the way from one neighbour to the other
+    assert look == pytest.approx([-math.sin(math.radians(8)), 0, -math.cos(math.radians(8))], abs=1e-9)
+    wide = spec_of(tmp_path, (tmp_path / "take.csv").read_text(), gaps={"jump_deg": 20000})
+    assert read_head(wide).cleaned.spikes.size == 0
+
+
+def test_a_turn_that_stays_is_told(tmp_path: Path) -> None:
+    times, places = walk(41)
+    angles = np.zeros((41, 3))
+    angles[20:, 0] = 170
+    spec = spec_of(tmp_path, rows(times, places, Rotation.from_euler("yxz", angles, degrees=True)))
+    assert read_head(spec).cleaned.turns == pytest.approx([0.2])
+    assert read_head(spec).cleaned.spikes.size == 0
+    (notice,) = take_notices(spec)
+    assert "the head turns faster than any at second 0.200" in notice
+
+
+def test_a_rate_that_is_not_that_of_the_stamps_is_told(tmp_path: Path) -> None:
+    times, places = walk()
+    text = rows(np.round(times, 3), places)
+    assert list(take_notices(spec_of(tmp_path, text, rate=101))) == []
+    (notice,) = take_notices(spec_of(tmp_path, text, rate=120))
+    assert notice.endswith(
+        "is said by the job to have 120 samples a second, but its stamps come 100 a second"
+    )
+
+
+def test_a_name_for_a_head_that_has_none_is_wrong(tmp_path: Path) -> None:
+    times, places = walk()
+    with pytest.raises(QuiltError, match="holds one head, which has no name"):
+        head_of(tmp_path, rows(times, places), subject="Visitor")
+
+
 def test_a_jump_that_stays_is_told_and_not_smoothed_over(tmp_path: Path) -> None:
     times, places = walk(81)
     places[40:] += [0.5, 0, 0]
@@ -219,3 +264,23 @@ def test_keyframes_with_orientations_turn_evenly() -> None:
         expected = Rotation.from_rotvec([0, math.radians(20), 0]).apply([0, 0, -1])
         assert viewer.look == pytest.approx(expected, abs=1e-12)
         assert viewer.up == pytest.approx([0, 1, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("names", "row", "words"),
+    [
+        ("time|x|y|z", "0|1|2|3", "F:1:1: the columns are separated by bars (expected commas, "),
+        ("time x y z", "0 0,1 2,5 3,5", "F:1:1: the columns are separated by blanks (expected commas, "),
+        ("time;x;y;z", "0,1,2,3", "F:2:1: columns separated by commas under names separated by semicolons "),
+        ("time,x,y,z", "0;1,5;2,5;3", "F:2:1: columns separated by semicolons under names separated by "),
+        ("time,x,y,z", "0,0,1,2,5,3,5", "F:2:1: 7 cells under 4 names: are commas decimal points here? "),
+    ],
+)  # fmt: skip
+def test_what_separates_columns_is_told_by_its_name(names: str, row: str, words: str, tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, f"{names}\n{row}\n")
+    assert message(spec, 1).startswith(words)
+
+
+def test_tabs_may_stand_beside_decimal_commas(tmp_path: Path) -> None:
+    head = head_of(tmp_path, "time\tx\ty\tz\n0,00\t1,5\t2\t3\n0,01\t1,5\t2\t3\n")
+    assert head.take.positions.tolist() == [[1.5, 2, 3]] * 2

@@ -36,6 +36,7 @@ FORMATS: dict[str, Callable[[RecordedSpec], Recording]] = {
     "gltf": read_gltf,
     "usd": read_usd,
 }
+_NAMELESS = ("csv", "tum", "chan", "touchdesigner", "arkit")
 _BY_SUFFIX = {
     ".trc": "trc",
     ".hfcs": "hfcs",
@@ -56,6 +57,9 @@ def read_recording(spec: RecordedSpec) -> Recording:
         ViewerError, JobError: the file cannot be read, or its format is not told.
     """
     kind = spec.format if spec.format != "auto" else _format_of(spec)
+    if spec.subject is not None and kind in _NAMELESS:
+        words = f"{spec.file} holds one head, which has no name (leave subject out)"
+        raise ViewerError(spec.source.problem("subject", words))
     return FORMATS[kind](spec)
 
 

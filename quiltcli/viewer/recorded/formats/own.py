@@ -12,7 +12,7 @@ from quiltcli.errors import Problem, ViewerError, raise_all
 from quiltcli.job import RecordedSpec
 from quiltcli.job.model import suggest
 from quiltcli.viewer.recorded import columns
-from quiltcli.viewer.recorded.tables import Dialect, dialect_of, read_rows, take_lines
+from quiltcli.viewer.recorded.tables import Dialect, dialect_of, read_rows, separator_problem, take_lines
 from quiltcli.viewer.recorded.take import Y_UP, Recording, wrong
 
 _SKIPPED = ("-", "_", "")
@@ -26,6 +26,8 @@ def read_own(spec: RecordedSpec) -> Recording:
     """
     lines = take_lines(spec.file)
     dialect = dialect_of(lines)
+    if problem := separator_problem(spec.file, lines, dialect):
+        raise ViewerError(problem)
     at = _first_line(lines)
     has_header = at < len(lines) and _is_header(dialect.cells(lines[at]))
     if has_header:

@@ -1,0 +1,96 @@
+"""Rays through the pixels of curved facets: what one eye sees of a chart, in pixels of its page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.charts.chart import Chart
+from quiltcli.charts.shapes import turned
+from quiltcli.geometry import BoolArray, FloatArray
+from quiltcli.layout import Layout
+
+NEAR = 0.05
+"""Pixels from a pixel's centre to the places of which differences tell how its rays change."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChartView:
+    """A chart as one eye sees it, at its place in the quilt.
+
+    Attributes:
+        chart: the chart.
+        eye: (3,) world metres.
+        turn: (3, 3) world from the viewer's own axes, for a projection; None where it is not turned.
+        facet_from_quilt: (2, 3) page pixels to facet pixels.
+    """
+
+    chart: Chart
+    eye: FloatArray
+    turn: FloatArray | None
+    facet_from_quilt: FloatArray
+
+    def facet_pixels(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Facet pixels of page pixels that broadcast; what broadcasts stays small where it can."""
+        (a, b, c), (d, e, f) = self.facet_from_quilt
+        i = a * x + c if b == 0 else b * y + c if a == 0 else a * x + b * y + c
+        j = e * y + f if d == 0 else d * x + f if e == 0 else d * x + e * y + f
+        return np.asarray(i), np.asarray(j)
+
+    def rays(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Rays (3, ...) from the eye through page pixels that broadcast, NaN where there are none."""
+        points = self.chart.points(*self.facet_pixels(x, y))
+        if not self.chart.stands:
+            return points if self.turn is None else turned(self.turn, points)
+        return points - self.eye.reshape(3, *[1] * (points.ndim - 1))
+
+    def lit(self, x: FloatArray, y: FloatArray) -> BoolArray:
+        """Which page pixels (...), given by their centres, show an image to the eye."""
+        i, j = self.facet_pixels(x, y)
+        return self.chart.lit(i, j, self.chart.points(i, j), self.eye)
+
+    def matrices(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Matrices (P, 3, 3) from page pixels (x, y, 1) to rays, each right at its own pixel centre (P,).
+
+        Beside the centre they go on straight, as fast as rays change there.
+        """
+        middle = self.rays(x, y)
+        du = (self.rays(x + NEAR, y) - self.rays(x - NEAR, y)) / (2 * NEAR)
+        dv = (self.rays(x, y + NEAR) - self.rays(x, y - NEAR)) / (2 * NEAR)
+        # Where a neighbour has no ray, as at the rim of a fisheye, all are taken for the one in the middle.
+        du, dv = (np.where(np.isfinite(step), step, 0.0) for step in (du, dv))
+        return np.stack((du, dv, middle - du * x - dv * y), axis=-1).transpose(1, 0, 2)
+
+
+Charts = Sequence[Chart | None]
+
+
+def chart_views(
+    charts: Charts, layout: Layout, eye: FloatArray, camera_from_world: FloatArray
+) -> tuple[ChartView | None, ...]:
+    """What an eye sees of every curved facet; None for flat ones.
+
+    Args:
+        charts: of F facets; empty where all are flat.
+        layout: the facets' places, one row a facet.
+        eye: (3,) world metres.
+        camera_from_world: (3, 3) rows right, up, and back of whoever looks.
+    """
+    views: list[ChartView | None] = []
+    for row, chart in enumerate(charts):
+        if chart is None:
+            views.append(None)
+            continue
+        turn = camera_from_world.T if chart.follows == "view" else None
+        views.append(ChartView(chart, eye, turn, inverse_affine(layout.quilt_from_facet[row])))
+    return tuple(views)
+
+
+def inverse_affine(matrix: FloatArray) -> FloatArray:
+    """The inverse (2, 3) of an affine map of the plane (2, 3), exact for whole-pixel moves."""
+    (a, b, c), (d, e, f) = matrix.tolist()
+    det = a * e - b * d
+    p, q, r, s = e / det, -b / det, -d / det, a / det
+    return np.array([[p, q, -(p * c + q * f)], [r, s, -(r * c + s * f)]]) + 0.0

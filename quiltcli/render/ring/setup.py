@@ -1,0 +1,162 @@
+"""What all turns of a job share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from quiltcli.errors import JobError, Problem, SceneError, ViewerError, raise_all
+from quiltcli.job import JobFile, load_lightfield_file, load_scene_file
+from quiltcli.job.halftone import HalftoneSpec
+from quiltcli.job.load import load_mirror_file
+from quiltcli.job.mirror import MirrorDisplayFile
+from quiltcli.job.ring import RingSpec
+from quiltcli.lightfield import Field, load_field
+from quiltcli.render.antialiasing import sample_places
+from quiltcli.render.setup import texture_limits
+from quiltcli.ring.build import curve_of, rig_of, scene_problems
+from quiltcli.ring.cast import see_by_rays
+from quiltcli.ring.picture import See, Show
+from quiltcli.ring.raster import Mesh, mesh_of, see
+from quiltcli.ring.rig import Rig
+from quiltcli.ring.tones import shortest_dwell
+from quiltcli.ring.vertexwise import see_by_vertices
+from quiltcli.scene import Scene
+from quiltcli.scene.bare import empty_scene
+from quiltcli.scene.motion import load_moving_scene
+from quiltcli.scene.source import SceneSource
+from quiltcli.scene.textures.pool import TextureStore
+
+METHODS: dict[str, See] = {"exact": see, "raycast": see_by_rays, "vertex": see_by_vertices}
+
+
+@dataclass(frozen=True)
+class RingStage:
+    """Everything above the loop over frames.
+
+    Attributes:
+        job: the job.
+        display: its display.
+        ring: its viewers.
+        rig: projector and mirror.
+        scene: the scene as it is at its start.
+        source: gives the scene of each frame; None where nothing moves.
+        photographs: the light field that is shown instead of the scene, which is empty then.
+        shortest: least time that a pixel dwells on a viewer, where that is made up for; else 1.
+    """
+
+    job: JobFile
+    display: MirrorDisplayFile
+    ring: RingSpec
+    rig: Rig
+    scene: Scene
+    source: SceneSource | None
+    shortest: float
+    photographs: Field | None = None
+    _meshes: list[tuple[Scene, Mesh]] = field(default_factory=list)
+
+    @property
+    def halftone(self) -> HalftoneSpec:
+        """How tones become bits."""
+        return self.job.halftone or HalftoneSpec()
+
+    @property
+    def positions(self) -> range:
+        """Numbers of the mirror positions, from 0."""
+        return range(self.rig.positions)
+
+    def show(self, frame: int) -> Show:
+        """What the pictures of a frame's turn share.
+
+        Raises:
+            QuiltError: viewers or scene of the frame are impossible.
+        """
+        scene = self.source.scene_at(frame) if self.source else self.scene
+        curve = curve_of(self.ring, frame, self.rig)
+        problems = list(scene_problems(scene.vertices, self.rig, curve))
+        if problems:
+            blame = load_scene_file(self.job.scene).source
+            told = [blame.problem((), f"at frame {frame} the scene {words}") for words in problems]
+            raise SceneError(told)
+        if not self._meshes or self._meshes[0][0] is not scene:
+            self._meshes[:] = [(scene, mesh_of(scene.vertices, scene.triangles))]
+        render, channels = self.job.render, self.job.output.channels
+        return Show(
+            rig=self.rig,
+            curve=curve,
+            scene=scene,
+            mesh=self._meshes[0][1],
+            channels=channels,
+            samples=sample_places(render.samples) if render.samples > 1 else ((0.0, 0.0),),
+            backface_culling=render.backface_culling,
+            near=self.ring.near,
+            far=self.ring.farthest,
+            see=METHODS[render.method],
+            field=self.photographs,
+            frame=frame,
+        )
+
+
+def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingStage:
+    """Load everything a job names, and look whether its frames are possible.
+
+    Raises:
+        QuiltError: something is wrong.
+    """
+    assert job.ring is not None
+    display = load_mirror_file(job.display)
+    rig = rig_of(display)
+    frames = list(job.frames if frames is None else frames)
+    photographs = None
+    if job.lightfield is not None:
+        photographs = load_field(load_lightfield_file(job.lightfield), frames)
+        scene, source = empty_scene(), None
+    else:
+        store = TextureStore(texture_limits(job))
+        scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps), store)
+    raise_all(SceneError, source.problems(frames) if source else ())
+    compensate = job.halftone is not None and job.halftone.compensate == "dwell"
+    shortest = shortest_dwell(rig) if compensate else 1.0
+    raise_all(JobError, _foreign(job))
+    if scene.soft is not None:
+        words = "has surfaces that light passes, which a 360° light field display does not show yet"
+        raise SceneError(Problem(words, file=str(job.scene)))
+    stage = RingStage(job, display, job.ring, rig, scene, source, shortest, photographs)
+    problems: list[Problem] = []
+    for frame in frames if job.ring.heads is not None else frames[:1]:
+        try:
+            curve_of(job.ring, frame, rig)
+        except ViewerError as error:
+            problems += error.problems
+    raise_all(ViewerError, list(dict.fromkeys(problems))[:20])
+    if frames:
+        stage.show(frames[0])
+    return stage
+
+
+def _foreign(job: JobFile) -> Iterator[Problem]:
+    """Problems with channels of facets that a mirror does not have."""
+    for name in ("motion", "cryptoobject", "cryptomaterial"):
+        if name in job.output.channels:
+            yield job.output.source.problem(
+                ("channels",), f"{name} is a channel of facets (expected no such channel beside ring)"
+            )
+
+
+def with_mesh(show: Show, mesh: Mesh) -> Show:
+    """The same pictures of other triangles."""
+    return replace(show, mesh=mesh)
+
+
+def notices(stage: RingStage) -> Iterable[str]:
+    """What is worth a word before a render."""
+    yield from stage.display.timing.notices()
+    points = stage.scene.vertices
+    radius = float(np.sqrt((points[:, [0, 2]] ** 2).sum(axis=1).max(initial=0.0)))
+    if radius > stage.rig.radius:
+        yield (
+            f"the scene reaches {radius:.3g} m from the axis and the mirror {stage.rig.radius:.3g} m: "
+            "what is beyond is cut off"
+        )

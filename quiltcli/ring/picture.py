@@ -1,0 +1,235 @@
+"""The picture of one mirror position: visibility, shading, and every channel of an ordinary render."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from dataclasses import field as made_by
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quiltcli.channels import CHANNELS, MOST_HALF, empty_buffers
+from quiltcli.geometry import BoolArray, IntArray, slices
+from quiltcli.lightfield import Field
+from quiltcli.projection.gaze import Gaze
+from quiltcli.ring.curve import Curve
+from quiltcli.ring.hits import EYE, ring_hits
+from quiltcli.ring.outline import lit_pixels
+from quiltcli.ring.raster import Limits, Mesh, Visible, see
+from quiltcli.ring.rebin import rebinned
+from quiltcli.ring.rig import Pose, Rig
+from quiltcli.scene import Scene
+from quiltcli.shading.adaptive import Shaded
+from quiltcli.shading.aovs import fill, light_at_points
+from quiltcli.viewer.viewer import Viewer
+
+_CHUNK = 16384
+See = Callable[..., Visible]
+
+
+@dataclass(frozen=True)
+class Show:
+    """What the pictures of a turn share.
+
+    Attributes:
+        rig: projector and mirror.
+        curve: the viewers.
+        scene: what is seen.
+        mesh: its triangles.
+        channels: names of the channels.
+        samples: places of the samples in a pixel, from its centre; the centre alone where there is one.
+        backface_culling: leave out what is seen from behind.
+        near: nearest that is drawn, metres.
+        far: farthest that is drawn, metres.
+        see: finds what pixels see.
+        field: photographs that are shown instead of the scene.
+        frame: of these, where they are animated.
+    """
+
+    rig: Rig
+    curve: Curve
+    scene: Scene
+    mesh: Mesh
+    channels: tuple[str, ...]
+    samples: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    backface_culling: bool = False
+    near: float = 0.01
+    far: float = 2.0
+    see: See = see
+    field: Field | None = None
+    frame: int = 1
+
+    @property
+    def limits(self) -> Limits | None:
+        """Near and far; None where the scene lies between them wherever viewers are."""
+        points = self.mesh.vertices
+        radius = float(np.sqrt((points[0] ** 2 + points[2] ** 2).max(initial=0.0)))
+        tall = float(np.abs(points[1]).max(initial=0.0))
+        distances = [self.curve.distance, *(user.distance for user in self.curve.users)]
+        heights = [abs(self.curve.height), *(abs(user.height) for user in self.curve.users)]
+        most = np.hypot(max(distances) + radius, max(heights) + tall)
+        if self.near < min(distances) - radius and self.far > most:
+            return None
+        return Limits(self.near, self.far)
+
+    @property
+    def viewer(self) -> Viewer:
+        """The viewer that channels are made for: depth is radial, places are the world's."""
+        look, up = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
+        return Viewer(0, EYE, look, up, self.near, self.far, "radial")
+
+
+@dataclass
+class Counts:
+    """What was done for a picture; two add up.
+
+    Attributes:
+        candidates: pairs of pixel and triangle that were tried.
+        fragments: pairs that met.
+        visible: pixels of the mirror that show the scene.
+        bend: pixels by which an edge may bend, at most.
+        seconds: by stage.
+    """
+
+    candidates: int = 0
+    fragments: int = 0
+    visible: int = 0
+    bend: float = 0.0
+    seconds: dict[str, float] = made_by(default_factory=dict)
+
+    def add(self, other: Counts) -> None:
+        """Add another's."""
+        self.candidates += other.candidates
+        self.fragments += other.fragments
+        self.visible += other.visible
+        self.bend = max(self.bend, other.bend)
+        for name, seconds in other.seconds.items():
+            self.seconds[name] = self.seconds.get(name, 0.0) + seconds
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One side of the mirror at one position.
+
+    Attributes:
+        pose: where it is.
+        lit: (H, W) pixels that light it.
+        buffers: flat (H·W,) by EXR channel; empty where it is not lit.
+        counts: what was done.
+    """
+
+    pose: Pose
+    lit: BoolArray
+    buffers: dict[str, NDArray[Any]]
+    counts: Counts
+
+    def rgb(self) -> NDArray[np.float16]:
+        """(H, W, 3) light."""
+        return np.stack([self.buffers[name] for name in "RGB"], axis=-1).reshape(*self.lit.shape, 3)
+
+
+def draw_picture(show: Show, angle: float, side: int = 0) -> Picture:
+    """Draw one side of the mirror at an angle in radians."""
+    pose = show.rig.at(angle, side)
+    lit = lit_pixels(show.rig, pose)
+    buffers, counts = empty_buffers(show.channels, lit.size), Counts()
+    if show.field is not None:
+        return Picture(pose, lit, buffers, _photographed(show, show.field, pose, lit, buffers))
+    _background(show, lit, buffers)
+    several = len(show.samples) > 1
+    light = tuple(name for name in show.channels if CHANNELS[name].averaged and several)
+    rest = tuple(name for name in show.channels if name not in light)
+    if rest:
+        counts.add(_centres(show, pose, lit, rest, buffers))
+    if light:
+        counts.add(_samples(show, pose, lit, light, buffers))
+    return Picture(pose, lit, buffers, counts)
+
+
+def _photographed(
+    show: Show, light: Field, pose: Pose, lit: BoolArray, buffers: dict[str, NDArray[Any]]
+) -> Counts:
+    """The light of a light field; it has no other channels."""
+    start = time.perf_counter()
+    found = np.minimum(rebinned(light, pose, show.curve, lit, show.frame), MOST_HALF)
+    for k, name in enumerate("RGB"):
+        buffers[name][:] = found[..., k].reshape(-1)
+    buffers["A"][:] = lit.reshape(-1)
+    counts = Counts(visible=int(np.count_nonzero(lit)))
+    counts.seconds["rebin"] = time.perf_counter() - start
+    return counts
+
+
+def _background(show: Show, lit: BoolArray, buffers: dict[str, NDArray[Any]]) -> None:
+    """The mirror shows the background's colour where it shows nothing else."""
+    if not show.scene.background.any():
+        return
+    for name, value in zip("RGB", show.scene.background, strict=True):
+        buffers[name][lit.reshape(-1)] = min(value, MOST_HALF)
+
+
+def _centres(
+    show: Show, pose: Pose, lit: BoolArray, channels: Sequence[str], buffers: dict[str, NDArray[Any]]
+) -> Counts:
+    seen, address, counts = _look(show, pose, lit, (0.0, 0.0))
+    start = time.perf_counter()
+    for part in slices(0, seen.pixel.size, _CHUNK):
+        fill(buffers, channels, Gaze(show.viewer, None), _shaded(show, pose, seen, address, part))
+    counts.seconds["shade"] = time.perf_counter() - start
+    return counts
+
+
+def _samples(
+    show: Show, pose: Pose, lit: BoolArray, channels: Sequence[str], buffers: dict[str, NDArray[Any]]
+) -> Counts:
+    """Means of light over the samples; what misses the scene counts as background."""
+    hits = np.zeros(lit.size, dtype=np.uint16)
+    sums = {name: [np.zeros(lit.size, dtype=np.float32) for _ in range(3)] for name in channels}
+    counts = Counts()
+    for sample in show.samples:
+        seen, address, some = _look(show, pose, lit, sample)
+        counts.add(some)
+        for part in slices(0, seen.pixel.size, _CHUNK):
+            shaded = _shaded(show, pose, seen, address, part)
+            pixel = address[part]
+            hits[pixel] += 1
+            for name in channels:
+                for values, total in zip(light_at_points(name, shaded), sums[name], strict=True):
+                    total[pixel] += shaded.hits.drawn(np.minimum(values, MOST_HALF))
+    pixel = np.flatnonzero(hits)
+    share = hits[pixel].astype(np.float32)
+    count = np.float32(len(show.samples))
+    for name, totals in sums.items():
+        for k, (layer, total) in enumerate(zip(CHANNELS[name].layers, totals, strict=False)):
+            values = total[pixel]
+            if name == "rgba":
+                values += (count - share) * show.scene.background[k]
+            buffers[layer][pixel] = np.minimum(values / count, MOST_HALF)
+        if name == "rgba":
+            buffers["A"][pixel] = share / count
+    counts.visible = pixel.size
+    return counts
+
+
+def _look(
+    show: Show, pose: Pose, lit: BoolArray, beside: tuple[float, float]
+) -> tuple[Visible, IntArray, Counts]:
+    """What the mirror's pixels see, and where they lie in the picture."""
+    start = time.perf_counter()
+    seen = show.see(pose, show.curve, show.mesh, show.rig.size, show.backface_culling, show.limits, beside)
+    window = seen.window
+    row, column = np.divmod(seen.pixel, max(window.width, 1))
+    address = (row + window.y) * show.rig.size[0] + column + window.x
+    kept = np.flatnonzero(lit.reshape(-1).take(address))
+    found = seen.some(kept)
+    seconds = {"visibility": time.perf_counter() - start}
+    counts = Counts(seen.candidates, seen.fragments, kept.size, seen.bend, seconds)
+    return found, address[kept], counts
+
+
+def _shaded(show: Show, pose: Pose, seen: Visible, address: IntArray, part: slice) -> Shaded:
+    hits = ring_hits(pose, show.mesh, show.scene, seen, part, address[part])
+    return Shaded(show.scene, EYE, hits)

@@ -1,0 +1,94 @@
+"""Surfaces that light may pass: how much of it they hold up, and the light of a pixel through all of them.
+
+From the front, with T the share of light that all layers before have let through, a layer of opacity α and
+colour c adds T·α·c, and T becomes T·(1 − α) (Porter & Duff 1984, over). What is `mask` has an α of 0 or 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray
+from quiltcli.scene import Scene
+from quiltcli.scene.scene import ALPHAS
+from quiltcli.shading.adaptive import Shaded
+from quiltcli.shading.materials import albedo_wants, alpha_at, at_materials
+from quiltcli.shading.shadows import CENTRE, Sample
+from quiltcli.visibility.draw import Drawing, Wanted
+from quiltcli.visibility.resolve.hits import Points
+
+_ONE = np.float32(1)
+_OPAQUE, _MASK = ALPHAS.index("opaque"), ALPHAS.index("mask")
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Points of a layer, each at a pixel of its own.
+
+    Attributes:
+        shaded: what channels are made of.
+        weight: (G,) share of the pixel's light that comes from them.
+        first: (G,) whether they are the nearest at their pixel that hold up any light.
+        inside: (G,) whether they lie in their facet's polygon, not in its bleed.
+    """
+
+    shaded: Shaded
+    weight: Float32Array
+    first: BoolArray
+    inside: BoolArray
+
+
+def opacity_at(scene: Scene, seen: Points) -> Float32Array:
+    """The share of light (n, k) that points hold up."""
+    table = scene.materials
+    assert table.opacity is not None
+    assert table.alpha is not None
+    assert table.cutoff is not None
+    (alpha,) = at_materials(scene, table.opacity[:, None], seen.triangle)
+    alpha = alpha * alpha_at(scene, seen)
+    if scene.corner_opacities is not None:
+        assert seen.weights is not None
+        first, second, third = scene.corner_opacities.take(seen.triangle, axis=0).transpose(2, 0, 1)
+        alpha = alpha * (first + seen.weights[0] * second + seen.weights[1] * third)
+    means = table.alpha.take(scene.material.take(seen.triangle))
+    cutoff = table.cutoff.take(scene.material.take(seen.triangle))
+    alpha = np.where(means == _MASK, (alpha >= cutoff).astype(np.float32), alpha)
+    alpha = np.where(means == _OPAQUE, _ONE, alpha)
+    return np.asarray(np.minimum(np.maximum(alpha, np.float32(0)), _ONE), dtype=np.float32)
+
+
+def opacity_wants(scene: Scene) -> Wanted:
+    """What `opacity_at` asks of hits."""
+    wanted = Wanted.NOTHING if scene.corner_opacities is None else Wanted.WEIGHTS
+    return wanted | albedo_wants(scene)
+
+
+def layers(
+    drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray, sample: Sample = CENTRE
+) -> Iterator[Layer]:
+    """What of a drawing is seen through something, from the front to the back.
+
+    Args:
+        drawing: a batch that is drawn.
+        wanted: what the hits shall tell.
+        scene: what was drawn.
+        eye: (3,) from where it is seen.
+        sample: which sample of its pixels was drawn.
+    """
+    if drawing.soft is None:
+        return
+    passed = np.ones(drawing.soft.pixel.size, dtype=np.float32)
+    light = np.ones(passed.size, dtype=np.bool_)
+    seen = np.zeros(passed.size, dtype=np.bool_)
+    for one in drawing.layers(light, wanted | opacity_wants(scene), scene):
+        opacity = opacity_at(scene, one.hits.points).reshape(-1)
+        through = passed.take(one.row)
+        some = opacity > 0
+        first = some & ~seen.take(one.row)
+        seen[one.row] |= some
+        yield Layer(Shaded(scene, eye, one.hits, sample=sample), through * opacity, first, one.inside)
+        passed[one.row] = through * (_ONE - opacity)
+        light[one.row] = passed.take(one.row) > 0

@@ -1,0 +1,308 @@
+"""What the papers on curved displays and on free projections measured, measured here: docs/surfaces.md.
+
+`python -m tests.benchmarks.surfaces` prints the tables, `--docs` puts them and the pictures into the page.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from quiltcli.analysis.simulate import PictureOptions, simulate
+from quiltcli.images.preview import tone_map
+from quiltcli.job import load_job
+from quiltcli.render.buffers import Buffers, new_buffers
+from quiltcli.render.crew import plan_of
+from quiltcli.render.methods import draw_frame
+from quiltcli.render.setup import Stage, set_stage
+from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.rays.embree import aim
+from quiltcli.visibility.shares import bin_frame
+from tests.benchmarks.page import put
+from tests.helpers.curved_jobs import boxes, curved_job
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "surfaces.md"
+PICTURES = ROOT / "docs" / "pictures"
+DEMOS = {
+    # Model: scene, eye, what it looks at, the camera if not there.
+    "sphere": ("room", (0.7, 1.5, 2.7), (0, 1, 0), None),
+    "cylinder_wall": ("city", (0, 1.7, 0), (0, 1.5, -5), None),
+    "dome": ("room", (0, 1.5, 0.5), (0, 2.6, -3), None),
+    "paraboloid": ("room", (0.4, 2.0, 1.7), (0, 0.6, 0), None),
+    "bezier_panel": ("room", (0.3, 1.5, 2.6), (0, 1.4, 0), None),
+    "panorama160": ("city", (0, 1.7, 0), (0, 1.7, -5), None),
+}
+
+
+def staged(display: str, scene: str, eye: object, at: object, more: str = "") -> tuple[Stage, Viewer]:
+    """The stage and the viewer of a job of one frame; `display` is a model's name, or a file's text."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        path = ROOT / "display_models" / f"{display}.yaml"
+        if "\n" in display:
+            path = folder / "display.yaml"
+            path.write_text(display)
+        (folder / "job.yaml").write_text(
+            f"quilt_job: 1\ndisplay: {path}\nscene: {ROOT}/scenes/{scene}.yaml\nframes: 1\nviewer:\n"
+            f"  near: 0.02\n  far: 2000\n  path: {{keyframes: [{{frame: 1, position: {list(eye)},"
+            f" look_at: {list(at)}}}]}}\n{more}"
+        )
+        stage = set_stage(load_job(folder / "job.yaml"))
+        return stage, stage.views([1])[0].viewer
+
+
+def drawn(stage: Stage, viewer: Viewer) -> tuple[Buffers, float]:
+    """The frame, and processor seconds."""
+    buffers = new_buffers(stage)
+    begin = time.process_time()
+    draw_frame(stage, viewer, buffers)
+    return buffers, time.process_time() - begin
+
+
+def demo_pictures() -> Iterator[Path]:
+    """A picture of each display model that is curved, and one of all together."""
+    tiles = []
+    for name, (scene, eye, at, _) in DEMOS.items():
+        with tempfile.TemporaryDirectory() as folder:
+            job = Path(folder) / "job.yaml"
+            job.write_text(
+                f"quilt_job: 1\ndisplay: {ROOT}/display_models/{name}.yaml\n"
+                f"scene: {ROOT}/scenes/{scene}.yaml\nframes: 1\nviewer:\n  near: 0.02\n"
+                f"  far: 2000\n  path: {{keyframes: [{{frame: 1,"
+                f" position: {list(eye)}, look_at: {list(at)}}}]}}\n"
+            )
+            options = PictureOptions(
+                size=(480, 360), samples=2, compare=False, fov=70 if name == "dome" else None
+            )
+            if name == "panorama160":
+                stage, viewer = staged(name, scene, eye, at, "output: {channels: [rgba]}\n")
+                buffers, _ = drawn(stage, viewer)
+                light = np.stack([buffers[c].reshape(1200, 1600).astype(np.float32) for c in "RGB"], axis=2)
+                light = light[300:900].reshape(300, 2, 800, 2, 3).mean(axis=(1, 3))
+                picture = tone_map(light)
+                tile = Image.fromarray(picture).resize((480, 180), Image.Resampling.LANCZOS)
+                framed = Image.new("RGB", (480, 360), (14, 14, 15))
+                framed.paste(tile, (0, 90))
+                tiles.append(framed)
+                continue
+            (found,) = simulate(load_job(job), [1], options)
+            tiles.append(Image.fromarray(tone_map(found.picture)))
+    sheet = Image.new("RGB", (3 * 480, 2 * 360))
+    for k, tile in enumerate(tiles):
+        sheet.paste(tile, (480 * (k % 3), 360 * (k // 3)))
+    path = PICTURES / "surfaces.png"
+    sheet.save(path)
+    yield path
+
+
+def pieces_table() -> str:
+    """Replication and wrong pixels of a cylinder in flat pieces, beside the exact cylinder."""
+    pictures, rows = {}, []
+    for pieces in (0, 20, 40, 80, 160, 320):
+        more = f", pieces: {pieces}" if pieces else ""
+        display = f"quilt_display: 1\nprojection: {{kind: cylinder{more}, pixels: [1600, 1200]}}\n"
+        stage, viewer = staged(display, "city", (0, 1.7, 0), (0, 1.7, -1), "output: {channels: [triangle]}\n")
+        buffers, seconds = drawn(stage, viewer)
+        pictures[pieces] = buffers["triangle"].copy()
+        wrong = float((pictures[pieces] != pictures[0]).mean())
+        rows.append(
+            (f"{pieces} strips" if pieces else "exact", f"{wrong:.1e}" if pieces else "–", f"{seconds:.2f} s")
+        )
+    head = (
+        "| picture of 1600 × 1200 | pixels with another triangle | processor time |\n| --- | ---: | ---: |\n"
+    )
+    return head + "".join(f"| {a} | {b} | {c} |\n" for a, b, c in rows)
+
+
+def facets_table() -> str:
+    """Prisms as flat facets: pairs of triangles and facets, as the papers count them."""
+    rows = []
+    for count in (40, 80, 160, 320):
+        stage, viewer = staged(_prism(count), "city", (0, 1.7, 0), (0, 1.7, -1))
+        binned = bin_frame(plan_of(stage, viewer, stage.rays(np.ones(count, dtype=bool), viewer)))
+        rows.append((count, binned.facet_pairs / binned.reaching))
+    display = "quilt_display: 1\nprojection: {kind: cylinder, pixels: [1600, 1200]}\n"
+    stage, viewer = staged(display, "city", (0, 1.7, 0), (0, 1.7, -1))
+    binned = bin_frame(plan_of(stage, viewer, stage.rays(np.ones(1, dtype=bool), viewer)))
+    head = "| panorama | pairs for each triangle |\n| --- | ---: |\n"
+    text = head + "".join(f"| {count} flat facets | {pairs:.2f} |\n" for count, pairs in rows)
+    return text + f"| exact, in patches | {binned.facet_pairs / binned.reaching:.2f} |\n"
+
+
+def _prism(count: int) -> str:
+    """A prism of so many panels around (0, 1.7, 0)."""
+    turn = 2 * np.pi / count
+    apothem = 1.0
+    width = 2 * apothem * np.tan(turn / 2)
+    high = 1.5 * np.pi
+    lines = ["quilt_display: 1", "panels:"]
+    for k in range(count):
+        a = k * turn
+        at = [apothem * np.sin(a), 1.7, -apothem * np.cos(a)]
+        pixels = max(1600 // count, 1)
+        lines.append(
+            f"- {{pixels: [{pixels}, 1200], size: [{width:.9f}, {high:.9f}],"
+            f" at: [{at[0]:.9f}, {at[1]}, {at[2]:.9f}], yaw_deg: {-np.degrees(a):.9f}}}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def speed_table() -> str:
+    """Drawing beside one Embree ray a pixel, in one run."""
+    cases = {
+        "dome 4096 × 1024 from inside, room": (
+            "surfaces:\n- {kind: sphere, radius: 2.5, zenith_deg: [0, 90], lit: inside, at: [0, 1, 0],"
+            " pixels: [4096, 1024]}",
+            "room",
+            (0.2, 1.3, 0.1),
+        ),
+        "cylinder panorama 1600 × 1200, city": (
+            "projection: {kind: cylinder, pixels: [1600, 1200]}",
+            "city",
+            (0, 1.7, 0),
+        ),
+        "equirectangular 2048 × 1024, city": (
+            "projection: {kind: equirect, pixels: [2048, 1024]}",
+            "city",
+            (0, 1.7, 0),
+        ),
+        "dome master 1536 × 1536, city": (
+            "projection: {kind: dome_master, pixels: [1536, 1536]}",
+            "city",
+            (0, 1.7, 0),
+        ),
+        "sphere 4096 × 2048 from outside, room": (
+            "surfaces:\n- {kind: sphere, radius: 1, at: [0, 1.5, 0], pixels: [4096, 2048]}",
+            "room",
+            (0.2, 1.7, 2.5),
+        ),
+    }
+    rows = []
+    for name, (display, scene, eye) in cases.items():
+        text = f"quilt_display: 1\n{display}\n"
+        stage, viewer = staged(text, scene, eye, (0, eye[1], -3), "output: {channels: [Z]}\n")
+        drawn(stage, viewer)
+        _, ours = drawn(stage, viewer)
+        count, theirs = _embree(stage, viewer)
+        rows.append(
+            (
+                name,
+                f"{count / 1e6:.2f}",
+                f"{1e9 * ours / count:.0f}",
+                f"{1e9 * theirs / count:.0f}",
+                f"{ours / theirs:.2f}",
+            )
+        )
+    head = "| display, scene | lit Mpx | quilt ns/px | Embree ns/px | ratio |\n"
+    head += "| --- | ---: | ---: | ---: | ---: |\n"
+    return head + "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _embree(stage: Stage, viewer: Viewer) -> tuple[int, float]:
+    """Lit pixels, and processor seconds of one single-precision ray for each, made and cast."""
+    target = aim(stage.scene.vertices, stage.scene.triangles, viewer, False)
+    view = stage.rays(np.ones(1, dtype=bool), viewer).views[0]
+    assert view is not None
+    width, height = stage.facets.size[0].tolist()
+    x, count = (np.arange(width) + 0.5)[None, :], 0
+    begin = time.process_time()
+    for first in range(0, height, 64):
+        y = (np.arange(first, min(first + 64, height)) + 0.5)[:, None]
+        rays = view.rays(x, y)[:, view.lit(x, y)].T.astype(np.float32)
+        target.embree.run(np.zeros_like(rays), rays)
+        count += len(rays)
+    return count, time.process_time() - begin
+
+
+def cubemap_table() -> str:
+    """How far pictures by way of a cube map are from the exact one."""
+    display = "quilt_display: 1\nprojection: {kind: cylinder, pixels: [1600, 1200]}\n"
+    eye, at = (0, 1.7, 0), (0, 1.7, -1)
+    stage, viewer = staged(display, "city", eye, at, "output: {channels: [rgba]}\n")
+    more = "render: {samples: 36}\noutput: {channels: [rgba]}\n"
+    fine, _ = staged(display, "city", eye, at, more)
+    truth = _light(drawn(fine, viewer)[0])
+    rows = [("exact, one sample a pixel", _psnr(_light(drawn(stage, viewer)[0]), truth))]
+    for samples in (4, 9):
+        more = f"render: {{samples: {samples}}}\noutput: {{channels: [rgba]}}\n"
+        finer, viewer = staged(display, "city", eye, at, more)
+        rows.append((f"exact, {samples} samples a pixel", _psnr(_light(drawn(finer, viewer)[0]), truth)))
+    for faces in (512, 1024, 2048):
+        more = f"render: {{method: cubemap, faces: {faces}}}\noutput: {{channels: [rgba]}}\n"
+        mapped, viewer = staged(display, "city", eye, at, more)
+        rows.append((f"cube map, faces of {faces}", _psnr(_light(drawn(mapped, viewer)[0]), truth)))
+    head = "| picture | PSNR against 36 exact samples a pixel |\n| --- | ---: |\n"
+    return head + "".join(f"| {name} | {value:.1f} dB |\n" for name, value in rows)
+
+
+def _light(buffers: Buffers) -> np.ndarray:
+    return np.minimum(np.stack([buffers[c].astype(np.float64) for c in "RGB"]), 1.0)
+
+
+def _psnr(picture: np.ndarray, truth: np.ndarray) -> float:
+    return float(-10 * np.log10(((picture - truth) ** 2).mean()))
+
+
+def threshold_table() -> str:
+    """Wrong pixels and pieces of the parametric paper's method, by its threshold: boxes in a sphere."""
+    rows = []
+    truth: Buffers = {}
+    for threshold in (None, 0.2, 0.1, 0.05, 0.025, 0.012, 0.01):
+        with tempfile.TemporaryDirectory() as name:
+            how = "" if threshold is None else f"render: {{method: tessellate, threshold: {threshold}}}\n"
+            display = "surfaces:\n- {kind: sphere, radius: 1, pixels: [1024, 512]}"
+            more = how + "output: {channels: [triangle, Z]}\n"
+            job = curved_job(Path(name), display, boxes(150, 0.3, 0.45), (1.2, 0.9, 2.7), more=more)
+            stage = set_stage(job)
+        viewer, buffers = stage.views([1])[0].viewer, new_buffers(stage)
+        begin = time.process_time()
+        record = draw_frame(stage, viewer, buffers)
+        seconds = time.process_time() - begin
+        if threshold is None:
+            truth = buffers
+            rows.append(("exact", "–", f"{record.triangles:,} triangles", f"{seconds:.2f} s"))
+            continue
+        shown = truth["triangle"] > 0
+        wrong = float((buffers["triangle"] != truth["triangle"])[shown].mean())
+        rows.append((f"{100 * threshold:g} %", f"{wrong:.1e}", f"{record.pairs:,}", f"{seconds:.2f} s"))
+    head = "| threshold, of the radius | wrong pixels | pieces | processor time |\n"
+    head += "| --- | ---: | ---: | ---: |\n"
+    return head + "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+TABLES = {
+    "thresholds": threshold_table,
+    "pieces": pieces_table,
+    "replication": facets_table,
+    "cubemap": cubemap_table,
+    "speed": speed_table,
+}
+
+
+def main() -> None:
+    """Print the tables, or put them into the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--docs", action="store_true", help="put tables and pictures into docs/surfaces.md")
+    parser.add_argument("--only", help="one table, or pictures")
+    given = parser.parse_args()
+    text = PAGE.read_text(encoding="utf-8")
+    for name, table in TABLES.items():
+        if given.only in (None, name):
+            found = table()
+            print(found)
+            text = put(text, name, found)
+    if given.only in (None, "pictures"):
+        print(*demo_pictures(), sep="\n")
+    if given.docs:
+        PAGE.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

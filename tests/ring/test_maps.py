@@ -1,0 +1,166 @@
+"""Pixel to ray and point to pixel, against each other and against what can be written down."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+from quiltcli.geometry import FloatArray, dot, rotation_deg
+from quiltcli.ring.curve import Curve, User, overlapping
+from quiltcli.ring.maps import backward, forward
+from quiltcli.ring.rig import Pose, ideal_projector
+
+SIZE = (768, 768)
+HEIGHT, DIAMETER = 0.6, 0.13
+BESIDE = User(azimuth=0.5, height=0.1, distance=0.6, hold=0.1, blend=0.25)
+VIEWERS = ((1.0, 0.4), (0.56, 0.3), (3.0, 1.0), (1.0, 1.0))
+
+
+def tilted() -> FloatArray:
+    """A projector beside the axis that looks a little aside."""
+    straight = ideal_projector(SIZE, HEIGHT, DIAMETER)
+    intrinsic = np.array([[3545.0, 0, 384], [0, 3545.0, 384], [0, 0, 1]])
+    turned = np.linalg.solve(intrinsic, straight[:, :3]) @ rotation_deg((2, 3, 4))
+    return np.asarray(intrinsic @ np.column_stack((turned, -turned @ [0.01, 0.62, -0.02])))
+
+
+def pose(angle: float = 0.3, ridge: float = 0.0, aside: bool = False, cone: bool = False) -> Pose:
+    projector = tilted() if aside else ideal_projector(SIZE, HEIGHT, DIAMETER)
+    return Pose(angle, math.pi / 4, ridge, projector, cone)
+
+
+CASES = list(product(VIEWERS, ((), (BESIDE,)), (False, True), (False, True), (0.0, 0.0325)))
+
+
+@pytest.mark.parametrize(("viewer", "users", "cone", "aside", "ridge"), CASES)
+def test_both_ways_agree(
+    viewer: tuple[float, float], users: tuple[User, ...], cone: bool, aside: bool, ridge: float
+) -> None:
+    mirror, curve = pose(0.3, ridge, aside, cone), Curve(viewer[1], viewer[0], users)
+    rng = np.random.default_rng(3)
+    points = mirror.from_world(rng.uniform(-0.04, 0.04, (500, 3))).T
+    x, y, _ = forward(mirror, curve, points)
+    rays = backward(mirror, curve, x, y)
+    along = rays.mirror - rays.viewer
+    along /= np.sqrt((along * along).sum(axis=0))
+    beside = points - rays.viewer - ((points - rays.viewer) * along).sum(axis=0) * along
+    assert np.abs(beside).max() < 1e-14
+    x, y = rng.uniform(200, 560, (2, 500))
+    rays = backward(mirror, curve, x, y)
+    there = rays.mirror + (rays.mirror - rays.viewer) * rng.uniform(-0.02, 0.02, 500)
+    again = forward(mirror, curve, there)
+    assert max(np.abs(again[0] - x).max(), np.abs(again[1] - y).max()) < 1e-10
+
+
+@pytest.mark.parametrize("viewer", VIEWERS)
+def test_the_ideal_fan_is_where_the_paper_has_it(viewer: tuple[float, float]) -> None:
+    mirror, curve = pose(1.1), Curve(viewer[1], viewer[0])
+    b = np.linspace(-0.1, 0.1, 9)[:, None]
+    a = np.linspace(-0.05, 0.05, 7)[None]
+    # In the image of the ideal projector: λ(e + b f) with λ = p / (1 − a), and M is −λa high.
+    reach = HEIGHT / (1 - a)
+    places = np.stack(np.broadcast_arrays(reach - 0.0, reach * b, -reach * a))
+    x, y = (mirror.pixel_from_ray @ places.reshape(3, -1))[:2] / (
+        mirror.pixel_from_ray @ places.reshape(3, -1)
+    )[2]
+    rays = backward(mirror, curve, x, y)
+    assert np.abs(rays.mirror - places.reshape(3, -1)).max() < 1e-13
+    world = mirror.to_world(rays.viewer.T).reshape(9, 7, 3)
+    assert np.abs(world - world[:, :1]).max() < 1e-13  # what shares b shares its viewpoint
+    q = HEIGHT * np.sin(np.arctan(b[:, 0]))
+    azimuth = np.arctan2(world[:, 0, 2], world[:, 0, 0])
+    # f points to where azimuths fall.
+    assert np.abs(azimuth - (1.1 - np.arcsin(q / HEIGHT) - np.arcsin(q / viewer[0]))).max() < 1e-13
+    assert np.abs(np.hypot(world[..., 0], world[..., 2]) - viewer[0]).max() < 1e-13
+    assert (dot(world, np.array([math.cos(1.1), 0, math.sin(1.1)])) > 0).all()
+
+
+@pytest.mark.parametrize("aside", [False, True])
+def test_light_that_is_only_reflected_lies_in_the_fan(aside: bool) -> None:
+    mirror, curve = pose(0.7, aside=aside), Curve(0.4, 1.0)
+    x, y = np.random.default_rng(1).uniform(200, 560, (2, 100))
+    rays = backward(mirror, curve, x, y)
+    onto = mirror.to_world(rays.mirror.T) - mirror.eye
+    normal = mirror.slope @ mirror.axes
+    back = onto - 2 * dot(onto, normal)[:, None] * normal
+    seen = (rays.viewer - rays.mirror).T @ mirror.axes
+    assert np.abs(back[:, 0] * seen[:, 2] - back[:, 2] * seen[:, 0]).max() < 1e-13
+
+
+def test_a_cone_keeps_the_share_along_the_cylinders() -> None:
+    mirror, curve = pose(0.7, cone=True), Curve(1.0, 1.0, (BESIDE,))
+    x, y = np.random.default_rng(1).uniform(100, 660, (2, 300))
+    rays = backward(mirror, curve, x, y)
+    out = rays.viewer - rays.mirror
+    into = rays.mirror[1] / np.sqrt((rays.mirror**2).sum(axis=0))
+    assert np.abs(out[1] / np.sqrt((out * out).sum(axis=0)) - into).max() < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("viewer", "rms", "worst"), [((1, 0.2), 0.17, 0.68), ((1, 0.4), 0.56, 2.0), ((1, 1), 2.1, 7.1)]
+)
+def test_planes_are_off_as_the_elevation_grows(viewer: tuple[float, float], rms: float, worst: float) -> None:
+    """Pixels between where plane and cone show the same point, over a ball of 4 cm."""
+    curve, rng = Curve(viewer[1], viewer[0]), np.random.default_rng(5)
+    points = rng.uniform(-0.04, 0.04, (20000, 3))
+    points = points[(points**2).sum(axis=1) < 0.04**2]
+    off = []
+    for angle in (0.0, 0.4):
+        x, y, _ = forward(pose(angle), curve, pose(angle).from_world(points).T)
+        u, v, _ = forward(pose(angle, cone=True), curve, pose(angle).from_world(points).T)
+        off.append(np.hypot(x - u, y - v))
+    assert np.sqrt(np.mean(np.concatenate(off) ** 2)) < 1.5 * rms
+    assert np.max(np.concatenate(off)) < 1.5 * worst
+    assert np.max(np.concatenate(off)) > 0.2 * worst
+
+
+def test_a_cone_is_a_plane_on_the_horizontal() -> None:
+    curve = Curve(0.0, 1.0)
+    # The row through the axis along f meets the mirror at the height of the viewers.
+    x = np.linspace(300, 460, 9)
+    straight = backward(pose(0.0), curve, np.full(9, 384.0), x)
+    round_ = backward(pose(0.0, cone=True), curve, np.full(9, 384.0), x)
+    assert np.abs(straight.mirror[2] + pose(0.0).origin[2]).max() < 1e-12
+    assert np.abs(straight.viewer - round_.viewer).max() < 1e-9
+
+
+def test_a_tracked_user_holds_a_stretch_of_the_curve_exactly() -> None:
+    curve = Curve(0.4, 1.0, (BESIDE,))
+    inside = BESIDE.azimuth + np.linspace(-BESIDE.hold, BESIDE.hold, 21)
+    assert (np.abs(np.array(curve.at(inside)).T - (0.6, 0.1)) < 1e-14).all()
+    assert np.array_equal(np.array(curve.at(inside + math.pi)).T, np.full((21, 2), (1.0, 0.4)))
+    at = np.linspace(-3, 3, 40001)
+    slope = np.gradient(np.array(curve.at(at)), at, axis=1)
+    assert np.abs(slope - np.array(curve.slopes(at)))[:, 1:-1].max() < 1e-5
+
+
+@pytest.mark.parametrize("aside", [False, True])
+def test_a_curve_is_met_in_its_plane_on_the_far_side(aside: bool) -> None:
+    mirror, curve = pose(0.5, aside=aside), Curve(0.4, 1.0, (BESIDE,))
+    x, y = np.random.default_rng(1).uniform(100, 660, (2, 300))
+    rays = backward(mirror, curve, x, y)
+    world = mirror.to_world(rays.viewer.T)
+    azimuth = np.arctan2(world[:, 2], world[:, 0])
+    assert np.abs(world - curve.points(azimuth)).max() < 1e-14
+    assert (rays.viewer[0] > rays.mirror[0]).all()
+    still = backward(mirror, Curve(0.4, 1.0), x, y)
+    same = backward(mirror, Curve(0.4, 1.0, (User(0.5, 0.4, 1.0, 0.1, 0.2),)), x, y)
+    assert np.abs(still.viewer - same.viewer).max() < 1e-14
+
+
+def test_curves_that_a_plane_meets_twice_are_found() -> None:
+    assert not Curve(0.4, 1.0, (BESIDE,)).too_steep(0.065)
+    assert Curve(0.4, 1.0, (User(0.5, 0.1, 0.5, 0.01, 0.02),)).too_steep(0.065)
+    assert not Curve(0.4, 1.0).too_steep(0.065)
+
+
+def test_users_who_differ_must_not_meet() -> None:
+    near = User(0.65, 0.3, 0.6, 0.1, 0.25)
+    far = User(2.5, 0.3, 0.6, 0.1, 0.25)
+    assert overlapping((BESIDE, near)) == (0, 1)
+    assert overlapping((BESIDE, far)) is None
+    assert overlapping((BESIDE, User(0.65, 0.1, 0.6, 0.1, 0.25))) is None
+    assert overlapping((User(3.1, 0.1, 1, 0.1, 0.2), User(-3.1, 0.2, 1, 0.1, 0.2))) == (0, 1)
