@@ -5,10 +5,11 @@ from __future__ import annotations
 import glob
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from quiltcli.display import load_display
 from quiltcli.errors import OutputError, Problem, QuiltError
@@ -174,11 +175,26 @@ def names_in(out: Path) -> Names:
     if "name" not in read_template(facet, "facet").fields:
         return Names(page, facet)
     try:
-        display = load_display(load_display_file(path.parent / str(data["display"])))
+        names = _display_names(path, data)
     except (QuiltError, KeyError) as error:
         words = "names images by names of facets, and its display cannot be read"
         raise OutputError(Problem(f"{words}: {error}", file=str(path))) from None
-    return Names(page, facet, fit_names(display.names))
+    return Names(page, facet, names)
+
+
+def facet_names_in(out: Path) -> tuple[str, ...]:
+    """Names of the facets whose images a render has left in a folder; none where nothing tells."""
+    path = Path(out) / "job.yaml"
+    try:
+        return _display_names(path, parse_yaml(path).data)
+    except (QuiltError, KeyError):
+        return ()
+
+
+def _display_names(path: Path, data: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names fit for files of the display that a job names."""
+    display = load_display(load_display_file(path.parent / str(data["display"])))
+    return fit_names(display.names)
 
 
 def name_of(path: Path) -> ImageName | None:

@@ -164,6 +164,8 @@ def test_both_eyes_and_the_simulation(tmp_path):
         (["--codec", "h264"], ["page_01.left.mp4", "page_01.right.mp4"]),
         (["--of", "simulation", "--size", "48x36", "-f", "1", "--codec", "prores"],
          ["simulation.left.mov", "simulation.right.mov"]),
+        (["--of", "facets", "-f", "1", "--codec", "hap"],
+         [f"{name}.{eye}.mov" for name in ("back", "right") for eye in ("left", "right")]),
     ):  # fmt: skip
         folder = tmp_path / words[-1]
         done = run.invoke(main, ["film", str(tmp_path / "out"), "-o", str(folder), *words])

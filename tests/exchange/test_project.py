@@ -365,3 +365,14 @@ def test_what_makes_no_sense_is_told(job, tmp_path):
     (tmp_path / "bad.json").write_text('{"right": [1, 0, 0]}')
     with pytest.raises(JobError, match=r"bad\.json: is no camera"):
         project(loaded, Master(tmp_path / "m.exr", "pinhole", camera=tmp_path / "bad.json"), options)
+
+
+def test_no_number_and_too_bright_a_one_stay_where_they_are():
+    lens = Pinhole(axes_of(0, 0), (-1, 1, -1, 1), (8, 8))
+    picture = np.ones((8, 8, 4), np.float32)
+    picture[2, 2, :3], picture[5, 5, :3] = np.nan, np.inf
+    light = tile_light(Window(0, 0, 16, 16), wall(axes_of(0, 0), 16), lens, texels([picture], lens))
+    assert np.isfinite(light.astype(np.float16)).all()
+    assert light.min() >= 0
+    assert light[10, 10, 0] > 1000
+    assert (light[:, 15, 0] == 1).all()

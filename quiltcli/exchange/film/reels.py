@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.exr.image import part_names, read_exr, read_header
-from quiltcli.images.names import names_in
+from quiltcli.images.names import facet_names_in, names_in
 from quiltcli.images.window import frame_size, whole_frame
 from quiltcli.job.frames import format_frames
 from quiltcli.viewer.view import EYES
@@ -25,7 +25,7 @@ class Reel:
     """A sequence.
 
     Attributes:
-        name: `page_01`, `facet_0001` or `page_01.left`.
+        name: `page_01`, the facet's name or `facet_0001`; with two eyes `page_01.left`.
         eye: `left` or `right`, empty where there is one eye.
         size: width and height, pixels.
         fps: frames a second.
@@ -83,20 +83,29 @@ def reels_of(out: Path, kind: str, frames: Sequence[int] | None = None) -> list[
     if gaps := sorted(set(range(every[0], every[-1] + 1, _step(every))) - set(every)):
         words = f"lacks frames {format_frames(gaps)} between others (choose frames with -f)"
         raise OutputError(Problem(words, file=str(out)))
-    return [_reel(kind, *key, every, found[key]) for key in sorted(found)]
+    names = facet_names_in(out) if kind == "facet" else ()
+    return [_reel(kind, *key, every, found[key], names) for key in sorted(found)]
 
 
 def _step(frames: Sequence[int]) -> int:
     return min((b - a for a, b in pairwise(frames)), default=1)
 
 
-def _reel(kind: str, number: int, eye: str, every: Sequence[int], files: dict[int, tuple[Path, str]]) -> Reel:
+def _reel(
+    kind: str,
+    number: int,
+    eye: str,
+    every: Sequence[int],
+    files: dict[int, tuple[Path, str]],
+    names: Sequence[str],
+) -> Reel:
     first = next(iter(files.values()))[0]
     header = read_header(first)
     missing = sorted(set(every) - set(files))
     if missing and kind == "page":
         words = f"page {number} has no image of frames {format_frames(missing)}, others have"
         raise OutputError(Problem(words, file=str(first.parent)))
-    name = f"{kind}_{number:0{2 if kind == 'page' else 4}}" + (f".{eye}" if eye else "")
+    known = names[number - 1] if number <= len(names) else f"{kind}_{number:0{2 if kind == 'page' else 4}}"
+    name = known + (f".{eye}" if eye else "")
     fps = Fraction(str(header.attributes.get("framesPerSecond", 30)))
     return Reel(name, eye, frame_size(header), fps, tuple(every), files)

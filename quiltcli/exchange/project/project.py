@@ -13,7 +13,7 @@ import numpy as np
 
 from quiltcli.display import demand_flat
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
-from quiltcli.exchange.elsewhere import Made, MadeOptions, half, prepare_made, write_made
+from quiltcli.exchange.elsewhere import Made, MadeOptions, prepare_made, write_made
 from quiltcli.exchange.project.lenses import Lens
 from quiltcli.exchange.project.master import Master, loaded
 from quiltcli.exchange.project.stmap import write_st_maps
@@ -145,7 +145,7 @@ def _band(task: Projected, row: int, band: Window, rays: FloatArray) -> tuple[in
         mine = inside | (owner == -facet)
         if not mine.any():
             continue
-        values = half(tile_light(tile, rays, task.lens, task.texels))
+        values = tile_light(tile, rays, task.lens, task.texels).astype(np.float16)
         for c, channel in enumerate(channels):
             np.copyto(channel[spot], values[..., c], where=mine)
         pixels += int(np.count_nonzero(inside))

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 
+from quiltcli.channels import MOST_HALF
 from quiltcli.exchange.project.lenses import Cube, Lens, Place
 from quiltcli.geometry import Float32Array, FloatArray, IntArray
 
@@ -52,33 +52,46 @@ class Texels:
     def linear(self, place: Place) -> Float32Array:
         """Light (P, 4) between the four texels around."""
         at, tx, ty = self.first(place, 1)
-        right, below = tx.astype(np.float32)[:, None], ty.astype(np.float32)[:, None]
-        pairs = self._runs(2)
-        upper, lower = pairs[at], pairs[at + self.width]
-        upper += (lower - upper) * below
-        light: Float32Array = upper[:, :4] + (upper[:, 4:] - upper[:, :4]) * right
-        return light
+        right, below = _wide(tx), _wide(ty)
+        upper = self._between(at, right)
+        lower = self._between(at + self.width, right)
+        lower -= upper
+        lower *= below
+        upper += lower
+        return upper
+
+    def _between(self, at: IntArray, right: Float32Array) -> Float32Array:
+        """Light (P, 4) between a texel and the one after it."""
+        left, step = self.light.take(at, axis=0), self.light.take(at + 1, axis=0)
+        step -= left
+        step *= right
+        left += step
+        return left
 
     def cubic(self, place: Place, blur: tuple[float, float]) -> Float32Array:
         """Light (P, 4) by cubics over the 16 texels around; `blur` is B of the kernels across and down."""
         at, tx, ty = self.first(place, 2)
-        across = [w.astype(np.float32)[:, None] for w in cubic_weights(tx, blur[0])]
-        down = [w.astype(np.float32)[:, None] for w in cubic_weights(ty, blur[1])]
-        runs = self._runs(4)
+        across = [_wide(weight) for weight in cubic_weights(tx, blur[0])]
         light = np.zeros((at.size, 4), dtype=np.float32)
-        for row, weight in enumerate(down):
-            four = runs[at + row * self.width]
-            line = four[:, :4] * across[0]
+        # Into buffers that are there: whole rows of four numbers in one run is what this is fast by.
+        line, texel = np.empty_like(light), np.empty_like(light)
+        for row, weight in enumerate(cubic_weights(ty, blur[1])):
+            start = at + row * self.width
+            self.light.take(start, axis=0, out=line, mode="clip")
+            line *= across[0]
             for column in (1, 2, 3):
-                line += four[:, 4 * column : 4 * column + 4] * across[column]
-            line *= weight
+                self.light.take(start + column, axis=0, out=texel, mode="clip")
+                texel *= across[column]
+                line += texel
+            line *= _wide(weight)
             light += line
-        return np.maximum(light, 0, out=light)  # its lobes dip below black beside what is bright
+        # Its lobes dip below black beside what is bright, and rise above that.
+        return np.clip(light, 0, MOST_HALF, out=light)
 
-    def _runs(self, count: int) -> Float32Array:
-        """Every texel and those after it (n, 4·count), without a copy."""
-        n = len(self.light) - count + 1
-        return as_strided(self.light, (n, 4 * count), (16, 4), writeable=False)
+
+def _wide(weight: FloatArray) -> Float32Array:
+    """A weight (P,) once for each channel (P, 4)."""
+    return np.repeat(weight.astype(np.float32), 4).reshape(-1, 4)
 
 
 def cubic_weights(t: FloatArray, b: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -105,13 +118,15 @@ def texels(pictures: list[Float32Array], lens: Lens) -> Texels:
     """Pictures (H, W, 4) of a lens with their margins; one, or the six faces of a cube."""
     height, width = pictures[0].shape[:2]
     m = MARGIN
-    light = np.empty((len(pictures), height + 2 * m, width + 2 * m, 4), dtype=np.float32)
+    light = np.zeros((len(pictures), height + 2 * m, width + 2 * m, 4), dtype=np.float32)
     for inner, picture in zip(light, pictures, strict=True):
-        inner[m:-m, m:-m] = picture
+        # No number and too bright a one would spread over their neighbours.
+        np.fmax(picture, 0, out=inner[m:-m, m:-m])
+        np.minimum(inner, MOST_HALF, out=inner)
         if lens.wraps == "sphere":
             _around(inner)
         else:
-            inner[m:-m, :m], inner[m:-m, -m:] = picture[:, :1], picture[:, -1:]
+            inner[m:-m, :m], inner[m:-m, -m:] = inner[m:-m, m : m + 1], inner[m:-m, -m - 1 : -m]
             inner[:m], inner[-m:] = inner[m], inner[-m - 1]
     found = Texels(light.reshape(-1, 4), width + 2 * m, height + 2 * m, (width, height))
     if isinstance(lens, Cube):

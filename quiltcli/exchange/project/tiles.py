@@ -75,7 +75,8 @@ def tile_light(window: Window, rays: FloatArray, lens: Lens, texels: Texels) -> 
     if nx * ny == 1:
         blur = _blur(window, rays, lens)
         light = texels.cubic(place, blur)
-        light *= place.inside[:, None]
+        if not place.inside.all():
+            light *= place.inside[:, None]
     else:
         light = _boxed(window, rays, lens, texels, d, (nx, ny))
     return light.reshape(height, width, 4)
@@ -138,7 +139,8 @@ def _boxed(
             moved = d + rays[:, 0, None, None] * across + rays[:, 1, None, None] * down
             place = lens.place(moved.reshape(3, -1))
             one = texels.linear(place)
-            one *= place.inside[:, None]
+            if not place.inside.all():
+                one *= place.inside[:, None]
             light += one
     light *= np.float32(1 / (count[0] * count[1]))
     return light
