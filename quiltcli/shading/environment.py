@@ -89,6 +89,13 @@ def _reflected(
     return glints, through
 
 
+def reflected_share(layer: Layer) -> tuple[Float32Array, ...]:
+    """What a layer reflects of even light once, by colour."""
+    roughness = np.sqrt(np.sqrt(np.asarray(layer.alpha2, dtype=np.float32)))
+    first, second = _albedo_parts(np.minimum(layer.front, _ONE), roughness)
+    return tuple(specular0 * first + layer.specular90 * second for specular0 in layer.specular0)
+
+
 def _mirrored(found: Around, surface: Surface, roughness: Values) -> Float32Array:
     """Radiance (3, n, k) as a mirror shows it that is as rough as the layer."""
     ray, normal = vector_values(surface.ray), found.normal

@@ -17,7 +17,7 @@ from quiltcli.scene.lights import Ambient, Area, Directional, Environment, Headl
 from quiltcli.scene.scene import Scene
 from quiltcli.shading.environment import Around, around
 from quiltcli.shading.nodes import Nodes, nodes_of
-from quiltcli.shading.rectangle import Received, mirrored_place, received_from
+from quiltcli.shading.rectangle import received_from
 from quiltcli.shading.shadows import Shadows, casts
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.draw import WholeTiles
@@ -42,35 +42,18 @@ class Arrival:
             everywhere.
         vl: (n, k) cosine between eye and lamp; None where nobody asked.
         received: (n, k) or (n, 1) share of `color` that a surface receives; None for light from everywhere.
-        image: what a layer that reflects makes of it, where that differs: of a lamp with a size.
+        size: the lamp where it has a size, which a layer's reflection shows.
         around: what comes from an environment, instead of all the others.
-        shown: (n, k) share of light from everywhere that nothing hides; None for all.
+        shown: (n, k) share of it that nothing hides; None for all. It is part of `received`.
     """
 
     color: Float32Array
     nl: Float32Array | None = None
     vl: Float32Array | None = None
     received: Float32Array | None = None
-    image: Image | None = None
+    size: Area | None = None
     around: Around | None = None
     shown: Float32Array | None = None
-
-
-@dataclass(frozen=True)
-class Image:
-    """The image of a lamp that has a size in n groups of k points: as of a lamp at its brightest place.
-
-    Attributes:
-        nl: (n, k) cosine between normal and that place, 0 where it is behind.
-        vl: (n, k) cosine between eye and that place.
-        received: (n, k) share of the lamp's colour that a surface there receives.
-        spread: (n, k) by how much the lamp's size widens the square of GGX's alpha.
-    """
-
-    nl: Float32Array
-    vl: Float32Array
-    received: Float32Array
-    spread: Float32Array
 
 
 @dataclass(frozen=True)
@@ -150,10 +133,7 @@ def shaded(arrival: Arrival, shown: Float32Array) -> Arrival:
         return replace(arrival, around=replace(arrival.around, shown=shown))
     if arrival.received is None:
         return replace(arrival, shown=shown)
-    image = arrival.image
-    if image is not None:
-        image = replace(image, received=image.received * shown)
-    return replace(arrival, received=arrival.received * shown, image=image)
+    return replace(arrival, received=arrival.received * shown, shown=shown)
 
 
 def reaches(light: Light, surface: Surface) -> BoolArray:
@@ -278,22 +258,7 @@ def _spot_place(light: Spot, middle: Middle) -> tuple[FloatArray, FloatArray]:
 def _from_rectangle(light: Area, surface: Surface, to_eye: bool) -> Arrival:
     got = received_from(light, surface)
     nl = np.divide(got.received, got.angle, out=np.zeros_like(got.received), where=got.angle > 0)
-    image = _image(light, surface, got) if to_eye else None
-    return Arrival(light.color, nl, None if image is None else image.vl, got.received, image)
-
-
-def _image(light: Area, surface: Surface, got: Received) -> Image:
-    """The image of a rectangle in a layer, as of a lamp at the place of it that is nearest the image's.
-
-    The layer is wider by the lamp's own width, and no brighter than the lamp (Karis, Real Shading in
-    Unreal Engine 4, 2013: representative points).
-    """
-    offset = mirrored_place(light, surface)
-    towards = PointVectors(offset)
-    offset *= np.reciprocal(np.sqrt(np.maximum(products(towards, towards), _LEAST_DISTANCE2)))
-    nl = _cosine(surface, out=products(surface.normal, towards))
-    vl = _to_eye(surface, out=products(surface.ray, towards))
-    return Image(nl, vl, nl * got.angle, got.angle * np.float32(0.25 / np.pi))
+    return Arrival(light.color, nl, None, got.received, size=light)
 
 
 def _rectangle(light: Area, middle: Middle) -> tuple[FloatArray, FloatArray]:

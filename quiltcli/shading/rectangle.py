@@ -54,16 +54,27 @@ def received_from(light: Area, surface: Surface) -> Received:
     is cut off.
     """
     centre = (light.position - surface.eye)[:, None, None] - _positions(surface)
-    normal = vector_values(surface.normal) * surface.normal_scale
-    normal = np.broadcast_to(normal, centre.shape).astype(np.float64)
-    ways = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    corners = [
-        centre + (s * light.across + t * light.along)[:, None, None]
-        for s, t in reversed(ways)  # anticlockwise, as seen from where it shines
-    ]
+    unit = vector_values(surface.normal) * surface.normal_scale
+    normal: FloatArray = np.broadcast_to(unit, centre.shape).astype(np.float64)
+    total = _polygon(_corners(light, centre), normal)
+    shines = normalized(cross(light.across, light.along))[:, None, None]
+    total *= np.where(sum_of_products(centre, shines) < 0, 0.5, 0.0)
+    received = np.maximum(sum_of_products(total, normal), 0)
+    angle = np.sqrt(sum_of_products(total, total))
+    return Received(received.astype(np.float32), np.maximum(angle, received).astype(np.float32))
+
+
+def _corners(light: Area, centre: FloatArray) -> list[FloatArray]:
+    """The corners of a rectangle about its middle (3, n, k), anticlockwise as seen from where it shines."""
+    ways = ((-1, 1), (1, 1), (1, -1), (-1, -1))
+    return [centre + (s * light.across + t * light.along)[:, None, None] for s, t in ways]
+
+
+def _polygon(corners: list[FloatArray], normal: FloatArray) -> FloatArray:
+    """Sum (3, n, k) over the edges of what is above horizons of these normals (3, n, k)."""
     height = [sum_of_products(corner, normal) for corner in corners]
-    total = np.zeros_like(centre)
-    leaving, entering = np.zeros_like(centre), np.zeros_like(centre)
+    total = np.zeros_like(corners[0])
+    leaving, entering = np.zeros_like(total), np.zeros_like(total)
     for k, corner in enumerate(corners):
         after, h0, h1 = corners[(k + 1) % 4], height[k], height[(k + 1) % 4]
         crosses = (h0 > 0) != (h1 > 0)
@@ -78,11 +89,7 @@ def received_from(light: Area, surface: Surface) -> Received:
     cut = sum_of_products(leaving, leaving) > 0
     if cut.any():
         total += np.where(cut, _edge(leaving, entering), 0)
-    shines = normalized(cross(light.across, light.along))[:, None, None]
-    total *= np.where(sum_of_products(centre, shines) < 0, 0.5, 0.0)
-    received = np.maximum(sum_of_products(total, normal), 0)
-    angle = np.sqrt(sum_of_products(total, total))
-    return Received(received.astype(np.float32), np.maximum(angle, received).astype(np.float32))
+    return total
 
 
 def _edge(begin: FloatArray, end: FloatArray) -> FloatArray:
@@ -106,21 +113,40 @@ def _crossed(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, Floa
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def mirrored_place(light: Area, surface: Surface) -> Float32Array:
-    """From points to the places (3, n, k) of a rectangle that lie nearest to its image in a mirror there."""
+def mirrored_share(light: Area, surface: Surface, alpha: FloatArray) -> Float32Array:
+    """Share (n, k) of a layer's reflection, of GGX's alpha (n, k), that shows a rectangle.
+
+    By the slopes of half vectors, GGX's lobe is a cosine's that is drawn in: to twice alpha in the plane of
+    incidence, to that times the cosine of incidence across it. So the share is Lambert's formula for a
+    rectangle drawn out as much (Heitz et al., Real-Time Polygonal-Light Shading with Linearly Transformed
+    Cosines, 2016; theirs are fitted, these are the lobe's own near its middle).
+    """
     centre = (light.position - surface.eye)[:, None, None] - _positions(surface)
     normal = (vector_values(surface.normal) * surface.normal_scale).astype(np.float64)
     ray = vector_values(surface.ray).astype(np.float64)
-    way = ray - 2 * sum_of_products(normal, ray) * normal
-    way = way / np.sqrt(sum_of_products(way, way) + 1e-300)
-    shines = normalized(cross(light.across, light.along))[:, None, None]
-    # Away from the rectangle's plane: as far towards its rim as rays go that are almost level with it.
-    meets = sum_of_products(centre, shines) / np.minimum(sum_of_products(way, shines), -1e-3)
-    offset = meets * way - centre
-    for axis in (light.across[:, None, None], light.along[:, None, None]):
-        share = np.clip(sum_of_products(offset, axis) / sum_of_products(axis, axis), -1, 1)
-        centre = centre + share * axis
-    return np.asarray(centre, dtype=np.float32)
+    ray = ray / np.sqrt(sum_of_products(ray, ray) + 1e-300)
+    facing = np.maximum(-sum_of_products(normal, ray), 1e-4)
+    way = ray + 2 * facing * normal
+    aside = np.stack(_crossed(way, np.broadcast_to(normal, way.shape)))
+    spare = np.stack(_crossed(way, np.broadcast_to(light.across[:, None, None], way.shape)))
+    aside = np.where(sum_of_products(aside, aside) > 1e-10, aside, spare)
+    aside = aside / np.sqrt(sum_of_products(aside, aside) + 1e-300)
+    inward = np.stack(_crossed(aside, way))
+    wide = 1 / (2 * alpha)
+    corners = [
+        np.stack(
+            np.broadcast_arrays(
+                sum_of_products(corner, inward) * wide,
+                sum_of_products(corner, aside) * (wide / facing),
+                sum_of_products(corner, way),
+            )
+        )
+        for corner in _corners(light, centre)
+    ]
+    ahead = np.zeros_like(corners[0])
+    ahead[2] = 1
+    share = _polygon(corners, ahead)[2] * (0.5 / np.pi)
+    return np.asarray(np.clip(share, 0, 1), dtype=np.float32)
 
 
 def _positions(surface: Surface) -> Any:

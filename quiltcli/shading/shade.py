@@ -20,9 +20,10 @@ from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.scene import Light as Lamp
 from quiltcli.scene import Scene
 from quiltcli.shading.brdf import Layer, Lobes, glints, layer_of, let_in_and_out, lobes_at
-from quiltcli.shading.environment import from_around
+from quiltcli.shading.environment import from_around, reflected_share
 from quiltcli.shading.lights import Arrival, arrivals, asks_for_places, casting, is_grey
 from quiltcli.shading.materials import Colors, Values, albedo_wants, lit_at
+from quiltcli.shading.rectangle import mirrored_share
 from quiltcli.shading.shadows import Sample, Shadows
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.resolve.hits import Points, Wanted
@@ -170,22 +171,26 @@ def _reflected(
     received: Float32Array = arrival.received
     reflected: tuple[Float32Array | None, ...] = (None,) * len(base)
     if layer is not None:
-        reflected = _glints(layer, arrival, received)
+        reflected = _glints(surface, layer, arrival, received)
         received = let_in_and_out(layer, arrival.nl, received)
     for k, glint in enumerate(reflected):
         yield k, received * (arrival.color[k] * base[k] * lobes.diffuse), glint
 
 
-def _glints(layer: Layer, arrival: Arrival, received: Float32Array) -> tuple[Float32Array, ...]:
+def _glints(
+    surface: Surface, layer: Layer, arrival: Arrival, received: Float32Array
+) -> tuple[Float32Array, ...]:
     """What a layer reflects of a lamp."""
-    assert arrival.vl is not None
     assert arrival.nl is not None
-    image = arrival.image
-    if image is None:
+    if arrival.size is None:
+        assert arrival.vl is not None
         return glints(layer, arrival.nl, arrival.vl, received, arrival.color, out=arrival.vl)
-    # As bright as a wider layer's, as sharp as its own.
-    received = image.received * (layer.alpha2 / (layer.alpha2 + image.spread))
-    return glints(layer, image.nl, image.vl, received, arrival.color, out=image.vl)
+    share = mirrored_share(arrival.size, surface, np.sqrt(np.asarray(layer.alpha2, dtype=np.float64)))
+    share = np.where(received > 0, share, np.float32(0))
+    if arrival.shown is not None:
+        share *= arrival.shown
+    single = reflected_share(layer)
+    return tuple(share * (part * arrival.color[k]) for k, part in enumerate(single))
 
 
 def _into(part: Values, other: Values) -> Float32Array | None:
