@@ -102,7 +102,7 @@ surfaces: env ## measure curved displays, and put tables and pictures into docs/
 	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
-	$(PY) -m pytest tests/system/test_golden.py --update-golden
+	$(PY) -m pytest tests/system/test_golden.py tests/system/test_golden_turn.py --update-golden
 
 schema: env ## write the schemas of the YAML files anew, docs/schema
 	$(PY) -m quiltcli.job.schema docs/schema

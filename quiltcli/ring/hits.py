@@ -13,6 +13,7 @@ from quiltcli.ring.forms import edge_values, forms_of
 from quiltcli.ring.raster import Mesh, Visible, depth
 from quiltcli.ring.rig import Pose
 from quiltcli.scene import Scene
+from quiltcli.visibility.resolve.footprints import PointEdges
 from quiltcli.visibility.resolve.hits import Hits, single_places
 from quiltcli.visibility.resolve.vectors import PointVectors
 
@@ -52,7 +53,26 @@ def ring_hits(pose: Pose, mesh: Mesh, scene: Scene, seen: Visible, part: slice, 
         weights=weights.astype(np.float32)[:, :, None],
         position=world[:, :, None],
         inside=pixel.size,
+        edges=_edges(mesh, scene, seen, pixel, triangle, weights),
     )
+
+
+def _edges(
+    mesh: Mesh, scene: Scene, seen: Visible, pixel: IntArray, triangle: IntArray, weights: FloatArray
+) -> PointEdges | None:
+    """What textures are filtered by: how weights change to the neighbours' rays, each its own."""
+    if scene.textures is None:
+        return None
+    width, size = seen.window.width, seen.window.size
+    slopes = np.empty((2, 2, pixel.size))
+    for axis, step in enumerate((1, width)):
+        ahead = (pixel % width < width - 1) if axis == 0 else (pixel < size - width)
+        way = np.where(ahead, step, -step)
+        if (width if axis == 0 else seen.window.height) == 1:
+            slopes[:, axis] = 0.0
+            continue
+        slopes[:, axis] = (met(mesh, seen, pixel + way, triangle)[0] - weights) * np.sign(way)
+    return PointEdges(triangle.astype(np.int32), weights, slopes)
 
 
 def met(mesh: Mesh, seen: Visible, pixel: IntArray, triangle: IntArray) -> tuple[FloatArray, FloatArray]:
