@@ -165,8 +165,8 @@ def curved_text(name: str) -> str:
 MIRRORS = {
     "spinning_mirror": (
         "a 360 degree light field display of Jones et al. (2007): a spinning mirror of 13 cm",
-        "# The paper does not say how far away the projector is, nor which bit is shown first: 0.6 m is inferred\n"
-        "# from the ten positions that an eye far away sees.\n"
+        "# The paper does not say how far away the projector is, nor which bit is shown first: 0.6 m\n"
+        "# follows from the ten positions that an eye far away sees.\n"
         "kind: lightfield360\nimage: [768, 768]\nprojector: {height: 0.6, diameter: 0.13}\n"
         "mirror: {tilt_deg: 45, outline: {disk: 0.13}}\n"
         "rotation: {positions: 288, direction: increasing, first_deg: 0}\n"

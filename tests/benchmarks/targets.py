@@ -35,7 +35,20 @@ def targets(results: Mapping[str, Any]) -> list[Target]:
     duels = {name: found["times"] for name, found in results.get("duels", {}).items()}
     found = [*_visibility(duels), *_frames(duels), *_sequences(results.get("sequences", []))]
     found += _textures({name: one["times"] for name, one in results.get("textures", {}).items()})
+    found += _rings(results.get("rings", {}))
     return [target for target in found if not math.isnan(target.value)]
+
+
+def _rings(found: Mapping[str, Any]) -> Iterator[Target]:
+    """A spinning mirror's pictures: one thread each, in processor time; whole turns in wall time."""
+    for row in found.get("visibility", ()):
+        name = f"{row['name']}, mirror"
+        yield Target(
+            f"visibility, edge functions {_EMBREE}", name, row["exact"] / row["embree"], row["limit"]
+        )
+        yield Target("visibility, edge functions / settled rays", name, row["exact"] / row["settled"], 0.4)
+    if turn := found.get("turn"):
+        yield Target("a turn, 2 workers / its visibility, 1", turn["name"], turn["whole"] / turn["seen"], 1.5)
 
 
 def _worst(what: str, values: Mapping[str, float], limit: float) -> Iterator[Target]:

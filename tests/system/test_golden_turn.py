@@ -1,4 +1,4 @@
-"""A golden turn of a spinning mirror: the bits of 24 positions, after closed forms and rays have had theirs."""
+"""A golden turn of a spinning mirror: the bits of 24 positions, the last look at everything together."""
 
 from __future__ import annotations
 
