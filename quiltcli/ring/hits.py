@@ -53,25 +53,27 @@ def ring_hits(pose: Pose, mesh: Mesh, scene: Scene, seen: Visible, part: slice, 
         weights=weights.astype(np.float32)[:, :, None],
         position=world[:, :, None],
         inside=pixel.size,
-        edges=_edges(mesh, scene, seen, pixel, triangle, weights),
+        edges=None if scene.textures is None else _edges(mesh, seen, pixel, triangle, weights),
     )
 
 
-def _edges(
-    mesh: Mesh, scene: Scene, seen: Visible, pixel: IntArray, triangle: IntArray, weights: FloatArray
-) -> PointEdges | None:
-    """What textures are filtered by: how weights change to the neighbours' rays, each its own."""
-    if scene.textures is None:
-        return None
-    width, size = seen.window.width, seen.window.size
-    slopes = np.empty((2, 2, pixel.size))
-    for axis, step in enumerate((1, width)):
-        ahead = (pixel % width < width - 1) if axis == 0 else (pixel < size - width)
-        way = np.where(ahead, step, -step)
-        if (width if axis == 0 else seen.window.height) == 1:
-            slopes[:, axis] = 0.0
-            continue
-        slopes[:, axis] = (met(mesh, seen, pixel + way, triangle)[0] - weights) * np.sign(way)
+def _edges(mesh: Mesh, seen: Visible, pixel: IntArray, triangle: IntArray, weights: FloatArray) -> PointEdges:
+    """What textures are filtered by: how weights change to the neighbouring pixels' rays.
+
+    Every pixel has a viewpoint of its own, so no plane over the picture says it; the ray of the neighbour,
+    met with the same triangle, does.
+    """
+    row, column = np.divmod(pixel, seen.window.width)
+    slopes = np.zeros((2, 2, pixel.size))
+    for axis, (place, length, step) in enumerate(
+        ((column, seen.window.width, 1), (row, seen.window.height, seen.window.width))
+    ):
+        if length > 1:
+            way = np.where(place < length - 1, 1, -1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                beside, _ = met(mesh, seen, pixel + way * step, triangle)
+            # Beyond the horizon there is nothing to filter by.
+            slopes[:, axis] = np.nan_to_num((beside - weights) * way, posinf=0.0, neginf=0.0)
     return PointEdges(triangle.astype(np.int32), weights, slopes)
 
 
