@@ -9,7 +9,7 @@ SEEN := out/demo/pictures
 DOCS := docs/pictures
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo pictures test test-long fuzz lint types format bench bench-docs packing-table surfaces golden schema docs dist clean
+.PHONY: help env demo pictures mirror-pictures test test-long fuzz lint types format bench bench-docs packing-table surfaces golden schema docs dist clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -75,6 +75,25 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/calibrate.py $(DOCS)/calibrate-residuals.png
 	$(PY) docs/pictures/reduce.py $(DOCS)/calibrate-residuals.png $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png $(DOCS)/show_*.png
 
+mirror-pictures: env ## make the pictures of docs/lightfield360.md anew
+	$(QUILT) render scenes/demo_mirror.yaml --positions 25-48 --overwrite --set output.tones=true
+	$(QUILT) preview out/demo_mirror/tones/turn_0001.0025.exr -o $(DOCS)/mirror-tones.png --view srgb
+	$(QUILT) unpack out/demo_mirror/packed/dvi.00000002.png -o out/demo_mirror/bits --overwrite
+	cp out/demo_mirror/bits/bits.00000025.png $(DOCS)/mirror-bits.png
+	for content in mcop diffuse perspective; do \
+		$(QUILT) simulate scenes/demo_mirror.yaml --tones --content $$content --eye 30,0.4,1 --size 480x480 --view srgb -o $(DOCS)/mirror-$$content.png --heat-map $(DOCS)/mirror-$$content-errors.png; done
+	for distance in 0.56 3; do \
+		$(QUILT) simulate scenes/demo_mirror.yaml --slices --eye 30,0.4,$$distance --size 480x480 --view srgb -o $(DOCS)/mirror-slices-$$distance.png; done
+	for slit in 0.06,0 0,0.06; do \
+		$(QUILT) simulate scenes/demo_mirror.yaml --tones --aperture $$slit --eye 30,0.4,1 --size 480x480 --view srgb -o $(DOCS)/mirror-slit-$$slit.png; done
+	mv $(DOCS)/mirror-slit-0.06,0.png $(DOCS)/mirror-slit-across.png; mv $(DOCS)/mirror-slit-0,0.06.png $(DOCS)/mirror-slit-upright.png
+	$(PY) docs/pictures/join.py $(DOCS)/mirror-seen.png $(DOCS)/mirror-mcop.png $(DOCS)/mirror-diffuse.png $(DOCS)/mirror-perspective.png
+	$(PY) docs/pictures/join.py $(DOCS)/mirror-errors.png $(DOCS)/mirror-mcop-errors.png $(DOCS)/mirror-diffuse-errors.png $(DOCS)/mirror-perspective-errors.png
+	$(PY) docs/pictures/join.py $(DOCS)/mirror-slices.png $(DOCS)/mirror-slices-0.56.png $(DOCS)/mirror-slices-3.png
+	$(PY) docs/pictures/join.py $(DOCS)/mirror-slits.png $(DOCS)/mirror-slit-across.png $(DOCS)/mirror-slit-upright.png
+	$(PY) docs/pictures/join.py $(DOCS)/mirror-shown.png $(DOCS)/mirror-tones.png $(DOCS)/mirror-bits.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/mirror-*.png
+
 test: env lint types ## lint, types and all tests but the long ones
 	$(PY) -m pytest -n 2
 
@@ -110,7 +129,7 @@ surfaces: env ## measure curved displays, and put tables and pictures into docs/
 	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
-	$(PY) -m pytest tests/system/test_golden.py --update-golden
+	$(PY) -m pytest tests/system/test_golden.py tests/system/test_golden_turn.py --update-golden
 
 schema: env ## write the schemas of the YAML files anew, docs/schema
 	$(PY) -m quiltcli.job.schema docs/schema

@@ -162,9 +162,34 @@ def curved_text(name: str) -> str:
     return f"{SCHEMA}# {name}: {title}\nquilt_display: 1\n{body}"
 
 
+MIRRORS = {
+    "spinning_mirror": (
+        "a 360 degree light field display of Jones et al. (2007): a spinning mirror of 13 cm",
+        "# The paper does not say how far away the projector is, nor which bit is shown first: 0.6 m\n"
+        "# follows from the ten positions that an eye far away sees.\n"
+        "kind: lightfield360\nimage: [768, 768]\nprojector: {height: 0.6, diameter: 0.13}\n"
+        "mirror: {tilt_deg: 45, outline: {disk: 0.13}}\n"
+        "rotation: {positions: 288, direction: increasing, first_deg: 0}\n"
+        "diffuser: {horizontal_deg: 1.25, reflection: plane}\n"
+        "packing: {images: 24, order: rgb, bits: lsb, refresh: 200, rpm: 1000}\n",
+    ),
+}
+"""Displays of kind lightfield360: what they are, and their files."""
+
+
+def mirror_text(name: str) -> str:
+    """The display file of a spinning mirror."""
+    title, body = MIRRORS[name]
+    schema = SCHEMA.replace("display.schema", "lightfield360.schema")
+    return f"{schema}# {name}: {title}\nquilt_display: 1\n{body}"
+
+
 def write(folder: Path, names: Iterable[str]) -> None:
     """Write models into a folder."""
     for name in names:
+        if name in MIRRORS:
+            (folder / f"{name}.yaml").write_text(mirror_text(name), encoding="utf-8")
+            continue
         if name in CURVED:
             (folder / f"{name}.yaml").write_text(curved_text(name), encoding="utf-8")
             continue
@@ -173,4 +198,4 @@ def write(folder: Path, names: Iterable[str]) -> None:
 
 
 if __name__ == "__main__":
-    write(Path(__file__).parent, sys.argv[1:] or [*MODELS, *CURVED])
+    write(Path(__file__).parent, sys.argv[1:] or [*MODELS, *CURVED, *MIRRORS])

@@ -15,11 +15,11 @@ from typing import Any
 
 import click
 
-from tests.benchmarks import curves, duels, meshes, opengl, page, sequence, shadowed, tables, textured
+from tests.benchmarks import curves, duels, meshes, opengl, page, rings, sequence, shadowed, tables, textured
 from tests.benchmarks.race import canary, crowding
 
 ROOT = Path(__file__).parents[2]
-PARTS = ("duels", "textures", "shadows", "sequences", "facets", "pixels", "triangles")
+PARTS = ("duels", "textures", "shadows", "sequences", "facets", "pixels", "triangles", "rings")
 
 
 @click.command(help=__doc__)
@@ -105,6 +105,9 @@ def _measure(
                 one = sequence.measure(meshes.detailed(3), 4 if quick else 20, compression, Path(scratch))
                 results.setdefault("sequences", []).append(one)
                 keep(f"sequence, {compression}")
+        if "rings" in parts:
+            results["rings"] = rings.measure(1 if quick else 4, whole=not quick)
+            keep("rings")
         made = results.setdefault("curves", {})
         if "facets" in parts:
             made["facets"] = list(curves.by_facets(rounds, curves.MODELS[:4:3] if quick else curves.MODELS))
@@ -128,6 +131,8 @@ def _tell(results: Mapping[str, Any], clock: str) -> None:
         click.echo("\n" + tables.shadow_table(results))
     if "sequences" in results:
         click.echo("\n" + tables.sequence_table(results))
+    if "rings" in results:
+        click.echo("\n" + "\n".join(rings.told(results["rings"])))
     for rows in made.values():
         click.echo("\n" + tables.curve_table(rows))
     if "facets" in made:

@@ -43,7 +43,7 @@ STRIP = {
 
 def models() -> list[str]:
     """Names of all display models."""
-    return sorted(path.stem for path in MODELS.glob("*.yaml"))
+    return sorted(path.stem for path in MODELS.glob("*.yaml") if "\nkind:" not in path.read_text())
 
 
 def loaded(name: str) -> Facets:

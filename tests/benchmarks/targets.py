@@ -40,7 +40,20 @@ def targets(results: Mapping[str, Any]) -> list[Target]:
         for kind in ("a sun", "a point", "two points"):
             what = f"shadows of {kind}, a pixel and lamp"
             found.append(Target(what, f"{name}/cube", cost(one, kind), 250, " ns"))
+    found += _rings(results.get("rings", {}))
     return [target for target in found if not math.isnan(target.value)]
+
+
+def _rings(found: Mapping[str, Any]) -> Iterator[Target]:
+    """A spinning mirror's pictures: one thread each, in processor time; whole turns in wall time."""
+    for row in found.get("visibility", ()):
+        name = f"{row['name']}, mirror"
+        yield Target(
+            f"visibility, edge functions {_EMBREE}", name, row["exact"] / row["embree"], row["limit"]
+        )
+        yield Target("visibility, edge functions / settled rays", name, row["exact"] / row["settled"], 0.4)
+    if turn := found.get("turn"):
+        yield Target("a turn, 2 workers / its visibility, 1", turn["name"], turn["whole"] / turn["seen"], 1.5)
 
 
 def _worst(what: str, values: Mapping[str, float], limit: float) -> Iterator[Target]:

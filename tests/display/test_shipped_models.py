@@ -10,6 +10,7 @@ import pytest
 
 from quiltcli.display import Facets, lit_facets, load_display, pitch_mm, shared_edges, triangulate
 from quiltcli.job import load_display_file
+from quiltcli.job.load import load_mirror_file
 
 FOLDER = Path(__file__).parents[2] / "display_models"
 sys.path.insert(0, str(FOLDER))
@@ -150,3 +151,10 @@ def test_curved_displays_are_what_the_generator_writes_and_can_be_built(name: st
     assert facets.count == 1
     assert facets.curved.all()
     assert 1.5e6 < np.prod(facets.size[0], dtype=np.int64) < 17e6
+
+
+@pytest.mark.parametrize("name", generate.MIRRORS)
+def test_mirrors_are_what_the_generator_writes(name: str) -> None:
+    assert (FOLDER / f"{name}.yaml").read_text() == generate.mirror_text(name)
+    display = load_mirror_file(FOLDER / f"{name}.yaml")
+    assert display.timing.rpm == display.packing.rpm == 1000

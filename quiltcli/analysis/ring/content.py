@@ -24,6 +24,7 @@ from quiltcli.ring.rig import Pose
 from quiltcli.scene import Scene
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import light_at_points
+from quiltcli.visibility.resolve.footprints import PointEdges
 from quiltcli.visibility.resolve.hits import point_hits
 from quiltcli.visibility.setup.planes import LATTICE
 
@@ -104,7 +105,9 @@ def _shaded(scene: Scene, target: Target, lines: Lines, triangle: np.ndarray) ->
         # Of a line alone nobody knows how far the next one is: textures are not filtered.
         slopes=None if scene.textures is None else np.zeros((2, 2, triangle.size)),
     )
-    hits = replace(hits, position=np.ascontiguousarray(position.T)[:, :, None])
+    # Without slopes textures are as sharp as they are.
+    edges = PointEdges(triangle.astype(np.int32), weights, np.zeros((2, 2, triangle.size)))
+    hits = replace(hits, position=np.ascontiguousarray(position.T)[:, :, None], edges=edges)
     light = light_at_points("rgba", Shaded(scene, EYE, hits))
     return np.stack([np.broadcast_to(part, (triangle.size, 1))[:, 0] for part in light], axis=-1)
 

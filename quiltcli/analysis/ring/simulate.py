@@ -102,10 +102,12 @@ def seen_light(stage: RingStage, frame: int, eyes: Iterable[EyeOptions]) -> Iter
     """What eyes see of a frame's turn, (H, W, 3) linear light each, and nothing beside it."""
     show = stage.show(frame)
     target = aim_at(show.mesh)
+    kept: dict[tuple[str, bool, bool], dict[tuple[int, int], Image]] = {}
     for options in eyes:
         assert options.eye is not None
         camera = camera_at(eye_place(options.eye), stage.rig.radius * 1.1, options.size)
-        seen = _seen(stage, show, target, frame, camera, options)
+        shown = kept.setdefault((options.content, options.tones, options.slices), {})
+        seen = _seen(stage, show, target, frame, camera, options, shown)
         yield np.broadcast_to(seen.light, (*seen.light.shape[:2], 3)).astype(np.float32)
 
 
@@ -127,7 +129,10 @@ def look_at_display(job: JobFile, frame: int, options: EyeOptions) -> EyePicture
         )
     camera = camera_at(eye_place(chosen), stage.rig.radius * 1.1, options.size)
     target = aim_at(show.mesh)
-    seen = _through_aperture(camera, options, lambda lens: _seen(stage, show, target, frame, lens, options))
+    kept: dict[tuple[int, int], Image] = {}
+    seen = _through_aperture(
+        camera, options, lambda lens: _seen(stage, show, target, frame, lens, options, kept)
+    )
     direct = _direct(stage, show, target, camera, options)
     covered = (seen.weight > _COVERED) & np.isfinite(seen.light).all(axis=-1)
     picture = np.broadcast_to(seen.light, (*seen.light.shape[:2], 3)).astype(np.float32)
@@ -170,9 +175,15 @@ def _opening(size: tuple[float, float]) -> Iterator[tuple[float, float]]:
 
 
 def _seen(
-    stage: RingStage, show: Show, target: Target, frame: int, camera: Camera, options: EyeOptions
+    stage: RingStage,
+    show: Show,
+    target: Target,
+    frame: int,
+    camera: Camera,
+    options: EyeOptions,
+    kept: dict[tuple[int, int], Image],
 ) -> Seen:
-    kept: dict[tuple[int, int], Image] = {}
+    """What one place of an opening sees; `kept` has what was drawn for others."""
 
     def image_of(position: int, side: int) -> Image:
         if (position, side) not in kept:
