@@ -1,4 +1,4 @@
-"""The picture of docs/panels.md: residuals over one of six made-up photos of a cube that was put up loosely."""
+"""The picture of docs/panels.md: residuals over a made-up photo of a cube that was put up loosely."""
 
 from __future__ import annotations
 

@@ -31,6 +31,7 @@ from quiltcli.job import (
     check_file,
     file_kind,
     load_calibration_file,
+    load_camera_file,
     load_display_file,
     load_job,
     load_lightfield_file,
@@ -217,11 +218,13 @@ def _check_job(findings: _Findings, path: Path) -> None:
     if facets is None or found:
         return
     findings.notices += stereo_notices(job, facets, scene)
-    findings.notices += dark_notices(job, facets)
     if len(findings.problems) == before:
         views = views_of(job, job.frames, settled_clip(job, facets))
         at = None if scene is None else source.scene_at if source is not None else lambda frame: scene
-        findings.notices += findings.run(lambda: list(_unseen(job, views, facets, placed, at))) or []
+        unseen = findings.run(lambda: list(_unseen(job, views, facets, placed, at)))
+        findings.notices += unseen or []
+        if not any("stays dark" in notice for notice in unseen or ()):
+            findings.notices += dark_notices(job, facets)
 
 
 def _unseen(
@@ -261,6 +264,10 @@ def _check_calibration(findings: _Findings, path: Path) -> None:
     findings.run(calibrate, findings.run(load_calibration_file, path))
 
 
+def _check_camera(findings: _Findings, path: Path) -> None:
+    findings.run(load_camera_file, path)
+
+
 def _check_lightfield(findings: _Findings, path: Path) -> None:
     file = findings.run(load_lightfield_file, path)
     # Of what moves, the job says the frames.
@@ -286,4 +293,5 @@ CHECKS: dict[str, Callable[[_Findings, Path], None]] = {
     "quilt_job": _check_job,
     "quilt_lightfield": _check_lightfield,
     "quilt_calibration": _check_calibration,
+    "quilt_camera": _check_camera,
 }

@@ -26,6 +26,7 @@ from quiltcli.job.lights import AmbientLight, AreaLight, DirectionalLight, Light
 from quiltcli.job.load import (
     file_kind,
     load_calibration_file,
+    load_camera_file,
     load_display_file,
     load_job,
     load_layout_file,
@@ -82,6 +83,7 @@ __all__ = [
     "file_sha256",
     "job_sha256",
     "load_calibration_file",
+    "load_camera_file",
     "load_display_file",
     "load_job",
     "load_layout_file",

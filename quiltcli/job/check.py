@@ -13,6 +13,7 @@ from quiltcli.job.load import (
     file_kind,
     load_any_display,
     load_calibration_file,
+    load_camera_file,
     load_job,
     load_lightfield_file,
     load_scene_file,
@@ -35,6 +36,7 @@ def check_file(path: Path | str) -> list[Problem]:
 
 
 _LOAD: dict[str, Callable[[Path], object]] = {
+    "quilt_camera": load_camera_file,
     "quilt_display": load_any_display,
     LayoutFile.kind: read_layout_table,
     "quilt_scene": load_scene_file,

@@ -218,6 +218,6 @@ def version_problem(data: dict[Any, Any], kind: str, source: Source) -> Problem 
 
 KINDS = (
     *("quilt_display", "quilt_layout", "quilt_scene", "quilt_job"),
-    *("quilt_lightfield", "quilt_calibration"),
+    *("quilt_lightfield", "quilt_calibration", "quilt_camera"),
 )
 NO_KIND = f"this is no file of quilt's (expected {either([f'{kind}: 1' for kind in KINDS])} as the first key)"

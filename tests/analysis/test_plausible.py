@@ -44,6 +44,6 @@ def test_what_cannot_be_meant_is_noted(job, tmp_path, case):
 def test_facets_that_are_always_dark_are_named_once(job, tmp_path):
     for corner in ("position: [0, 0, 2]", "position: [-0.5, 0.2, 3]"):
         replaced(tmp_path, "job.yaml", corner, "position: [2, 0, 3]")
-    assert "facet 2 (right) faces away from the viewer in every frame: dark" in notes(job)
+    assert "the eye is behind facet 2 (right), which stays dark" in notes(job)
     replaced(tmp_path, "job.yaml", "{frame: 4, position: [2, 0, 3]", "{frame: 4, position: [0, 0, 3]")
     assert "faces away" not in notes(job)

@@ -158,7 +158,7 @@ def test_a_file_of_no_kind_is_named_so(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("a: 1\n")
     assert messages(lambda: file_kind(tmp_path / "a.yaml"), tmp_path) == [
         "a.yaml:1:1: this is no file of quilt's (expected quilt_display: 1, quilt_layout: 1, quilt_scene: 1,"
-        " quilt_job: 1, quilt_lightfield: 1 or quilt_calibration: 1 as the first key)"
+        " quilt_job: 1, quilt_lightfield: 1, quilt_calibration: 1 or quilt_camera: 1 as the first key)"
     ]
 
 

@@ -23,7 +23,7 @@ BARE = {
     *("aspect", "metallic", "roughness", "specular", "opacity", "cutoff", "scale", "matrix", "facets"),
     *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces", "threshold"),
     *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),
-    *("uv_set", "offset", "strength"),
+    *("uv_set", "offset", "strength", "quilt_camera", "distortion"),
 }
 
 
