@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from quiltcli.calibration.markers import place_markers
 from quiltcli.calibration.panels.calibrate import Wishes, calibrate
@@ -34,7 +35,8 @@ def main(out: Path) -> None:
         paths = photos.save(Path(scratch), pictures)
         solution, used = calibrate(facets, paths, Wishes())
         write_report(Path(scratch) / "report", solution, facets, used)
-        out.write_bytes((Path(scratch) / "report" / "photo_02.residuals.png").read_bytes())
+        with Image.open(Path(scratch) / "report" / "photo_02.residuals.png") as picture:
+            picture.crop((460, 300, 1160, 860)).save(out)
 
 
 if __name__ == "__main__":
