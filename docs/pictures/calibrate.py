@@ -36,7 +36,7 @@ def main(out: Path) -> None:
         solution, used = calibrate(facets, paths, Wishes())
         write_report(Path(scratch) / "report", solution, facets, used)
         with Image.open(Path(scratch) / "report" / "photo_02.residuals.png") as picture:
-            picture.crop((460, 300, 1160, 860)).save(out)
+            picture.crop((400, 300, 1200, 900)).save(out)
 
 
 if __name__ == "__main__":
