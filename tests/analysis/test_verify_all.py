@@ -145,7 +145,7 @@ def test_the_scan(name, which, tmp_path, dragon):
 
 
 def test_every_display_is_here():
-    # Curved displays and the spinning mirror are held against rays of their own, in tests/render.
+    # Curved displays are held against rays in tests/render, the mirror with the displays of its kind.
     elsewhere = {*curved_models.EYES, "spinning_mirror"}
     assert {path.stem for path in (ROOT / "display_models").glob("*.yaml")} == EYES.keys() | elsewhere
 
