@@ -354,6 +354,8 @@ class JobFile(FileModel):
             if method in ("exact", "vertex"):
                 yield ("render", "method"), f"expected {either(METHODS)} beside viewer, got {method}"
             return
+        if self.halftone is not None and self.halftone.before and self.lightfield is None:
+            yield ("halftone", "before"), "is for photographs (expected `lightfield` and no scene beside it)"
         if "method" in self.render.model_fields_set and method not in RING_METHODS:
             yield ("render", "method"), f"expected {either(RING_METHODS)} beside ring, got {method}"
         if self.layout is not None:
