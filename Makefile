@@ -115,7 +115,7 @@ format: env ## bring the code's layout in order
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-bench: env ## measure against Embree, OpenGL and the disk: 8 minutes (BENCH=--quick: one)
+bench: env ## measure against Embree, OpenGL and the disk: 9 minutes (BENCH=--quick: one)
 	$(PY) -m tests.benchmarks $(BENCH)
 
 bench-docs: env ## the same, and put the tables and pictures into docs/performance.md
