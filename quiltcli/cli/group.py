@@ -36,6 +36,7 @@ COMMANDS = (
     "schema",
     "simulate",
     "stereo",
+    "study",
     "sweetspot",
     "unmap",
     "unpack",
