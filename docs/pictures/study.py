@@ -1,4 +1,4 @@
-"""The chart of persons in docs/study.md, of the log that the tests make up: `… study.py LOG.csv CHART.svg`."""
+"""The chart of persons in docs/study.md, of the log that the tests make up: `study.py LOG.csv CHART.svg`."""
 
 import sys
 from pathlib import Path

@@ -35,7 +35,7 @@ def test_each_term_is_a_share_of_twice_its_greatest_value(tmp_path: Path) -> Non
     assert ease.total.tolist() == pytest.approx([0.6, 0.75], abs=1e-15)
 
 
-def test_the_greatest_term_of_a_log_counts_half_even_if_nobody_found_the_shortest_path(
+def test_the_greatest_term_counts_half_even_if_nobody_found_the_shortest_path(
     tmp_path: Path,
 ) -> None:
     ease = study_of(tmp_path, "a,1,wall,10,20,0,1,10", "b,1,wall,10,25,15,4,10")
