@@ -30,6 +30,7 @@ COMMANDS = (
     "pack",
     "path",
     "pattern",
+    "points",
     "preview",
     "project",
     "render",
