@@ -44,6 +44,7 @@ class Places:
         corner: (n, 2) pixel x, y of the page.
         source: finds lines in the display file.
         keys: where in the file each facet's own entry stands.
+        page_size: width and height of the pages that the places are on; None where the file does not say.
     """
 
     facet: Int32Array
@@ -53,6 +54,7 @@ class Places:
     corner: Int32Array
     source: Source
     keys: Mapping[int, tuple[str | int, ...]]
+    page_size: tuple[int, int] | None = None
 
     def problem(self, key: Sequence[str | int], message: str) -> Problem:
         """A problem with the place of a facet: the key begins with `facets` and its id."""

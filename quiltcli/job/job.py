@@ -47,7 +47,11 @@ from quiltcli.job.names import NamesSpec
 from quiltcli.job.ring import RingSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
-METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap", "tessellate")
+UNSORTED = ("octree", "independent")
+METHODS = (
+    *("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap", "tessellate"),
+    *UNSORTED,
+)
 RING_METHODS = ("exact", "raycast", "vertex")
 DEPTH_BITS = ("16", "24", "32f")
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
@@ -202,7 +206,7 @@ class RenderSpec(Model):
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        by_distance = ("homography", "raycast", "cubemap", "tessellate", *RING_METHODS)
+        by_distance = ("homography", "raycast", "cubemap", "tessellate", *UNSORTED, *RING_METHODS)
         return "zv" in channels or self.depth_bits is not None or self.method not in by_distance
 
     def cross_checks(self) -> Iterator[Complaint]:
@@ -224,7 +228,7 @@ class RenderSpec(Model):
             yield ("depth_bits",), "a cube map has exact depth (expected no such key beside method: cubemap)"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
-        if self.method in ("raycast", "twopass") and self.shutter:
+        if self.method in ("raycast", "twopass", *UNSORTED) and self.shutter:
             yield ("shutter",), f"expected 0 beside method: {self.method}, got {self.shutter:g}"
 
 

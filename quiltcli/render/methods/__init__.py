@@ -20,6 +20,7 @@ from quiltcli.render.methods.cubemap import draw_cubemap
 from quiltcli.render.methods.raycast import cast_frame
 from quiltcli.render.methods.tessellate import draw_tessellated
 from quiltcli.render.methods.twopass import draw_twice
+from quiltcli.render.methods.unsorted import draw_by_octree, draw_independently
 from quiltcli.render.moments import Moment
 from quiltcli.render.report import FrameRecord, together
 from quiltcli.render.setup import Stage
@@ -33,8 +34,10 @@ OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], Fram
     "raycast": cast_frame,
     "cubemap": draw_cubemap,
     "tessellate": draw_tessellated,
+    "octree": draw_by_octree,
+    "independent": draw_independently,
 }
-"""Methods that do not rasterize the quilt."""
+"""Methods that do not rasterize the quilt, and those that do without sorting triangles to facets."""
 
 
 def draw_frame(
