@@ -17,7 +17,7 @@ from quiltcli.job.frames import format_frames
 from quiltcli.job.sequence import MeshSequence, numbered
 from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
-from quiltcli.scene.importers.gltf import FileLight, Playing, gltf_lights, gltf_parts
+from quiltcli.scene.importers.model import FileLight, Playing
 from quiltcli.scene.importers.part import Part, moved, placed
 from quiltcli.scene.materials import Surface, textures_of
 from quiltcli.scene.movers import Mover
@@ -124,9 +124,9 @@ def bring(
         SceneError: nothing of it can be drawn.
     """
     override = {} if item.material is None else item.material.changes()
-    parts, lights = asset.parts, () if asset.model is None else gltf_lights(asset.model, time, playing)
+    parts, lights = asset.parts, () if asset.model is None else asset.model.lights(time, playing)
     if playing is not None and asset.model is not None:
-        parts = gltf_parts(asset.model, time, playing)
+        parts = asset.model.parts(time, playing)
     baked = bake(_parts(parts, matrix, override), item.normals)
     if playing is not None and asset.model is not None and baked.empty and time is not None:
         baked = _from_rest(item, asset, baked, Mover(asset.model, playing, matrix, baked), override, time)
@@ -170,7 +170,7 @@ def _playing(item: ObjectSpec, asset: Asset) -> Playing | None:
         raise AnimationError(Problem("has no animation", str(item.mesh)))
     playing = Playing(item.animation.clip, item.animation.after)
     try:
-        asset.model.chosen(playing)
+        asset.model.check(playing)
     except MeshError as error:
         raise AnimationError(error.problems) from error
     return playing
@@ -238,7 +238,7 @@ class OneMesh:
             assert matrix is not None
             return self._carried(matrix)
         vertices, normals = Mover(model, self.playing, matrix, self.start.baked).at(time)
-        lights = _placed_lights(gltf_lights(model, time, self.playing), matrix)
+        lights = _placed_lights(model.lights(time, self.playing), matrix)
         baked = replace(self.start.baked, vertices=vertices, normals=normals)
         return replace(self.start, baked=baked, lights=lights)
 
@@ -251,7 +251,7 @@ class OneMesh:
         vertices, _ = moved(matrix, self._local, np.empty((0, 3)))
         _, normals = moved(way, np.empty((0, 3)), baked.normals.astype(np.float64))
         assert normals is not None
-        lights = () if model is None else _placed_lights(gltf_lights(model), matrix)
+        lights = () if model is None else _placed_lights(model.lights(), matrix)
         new = replace(baked, vertices=vertices, normals=normalized(normals).astype(np.float32))
         return replace(self.start, baked=new, lights=lights)
 
