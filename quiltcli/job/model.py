@@ -292,7 +292,7 @@ def nearest_file(path: Path) -> str:
     return f" (did you mean {near!r}?)" if near else ""
 
 
-MESHES = (".obj", ".ply", ".off", ".stl", ".glb", ".gltf")
+MESHES = (".obj", ".ply", ".off", ".stl", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 YAMLS = (".yaml", ".yml")
 MeshPath = Annotated[Path, ExistingFile(MESHES, "a mesh")]
 YamlPath = Annotated[Path, ExistingFile(YAMLS, "a YAML file")]

@@ -15,7 +15,17 @@ from quiltcli.geometry import Float32Array
 from quiltcli.scene.bake import Baked, given_opacities, given_uv
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.model import FileLight, Model, Playing
-from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point, spot
+from quiltcli.scene.lights import (
+    Light,
+    ambient,
+    default_lights,
+    directional,
+    environment,
+    lights_of,
+    panel,
+    point,
+    spot,
+)
 from quiltcli.scene.materials import Surface, material_table
 from quiltcli.scene.objects import Brought, ObjectError, SceneObject, bring, load_object
 from quiltcli.scene.scene import Scene
@@ -239,4 +249,10 @@ def _lamp(light: FileLight, scale: float, *, shadows: bool) -> Light:
         return directional(light.direction, color, shadows=shadows)
     if light.kind == "point":
         return point(light.position, color, light.reach, shadows=shadows)
+    if light.kind == "area":
+        return panel(light.position, light.across, light.along, color, shadows=shadows)
+    if light.kind == "ambient":
+        return ambient(color)
+    if light.kind == "environment":
+        return environment(light.panorama, light.axes, color, shadows=shadows)
     return spot(light.position, light.direction, color, light.cone, light.reach, shadows=shadows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -128,8 +128,8 @@ def bring(
     if playing is not None and asset.model is not None:
         parts = asset.model.parts(time, playing)
     baked = bake(_parts(parts, matrix, override), item.normals)
-    if playing is not None and asset.model is not None and baked.empty and time is not None:
-        baked = _from_rest(item, asset, baked, Mover(asset.model, playing, matrix, baked), override, time)
+    if playing is not None and asset.model is not None and time is not None:
+        baked = _started(item, asset, baked, Mover(asset.model, playing, matrix, baked), override, time)
     if not len(baked.triangles):
         raise SceneError(Problem("every triangle is without area or not finite", str(item.mesh)))
     given = () if item.material is None else textures_of(item.material)
@@ -145,6 +145,18 @@ def _parts(parts: Sequence[Part], matrix: FloatArray | None, override: dict[str,
     if "color" in override:
         parts = tuple(replace(part, colors=None, opacities=None) for part in parts)
     return tuple(parts)
+
+
+def _started(
+    item: ObjectSpec, asset: Asset, baked: Baked, mover: Mover, override: dict[str, object], time: float
+) -> Baked:
+    """An object of an animation as it is at a time."""
+    if mover.model.hidden(time, mover.playing) and len(baked.triangles):
+        vertices, normals = mover.at(time)
+        return replace(baked, vertices=vertices, normals=normals)
+    if baked.empty and mover.model.form(time, mover.playing) == mover.model.form(None, mover.playing):
+        return _from_rest(item, asset, baked, mover, override, time)
+    return baked
 
 
 def _from_rest(
@@ -207,6 +219,7 @@ class OneMesh:
     matrix: FloatArray | None
     start: Brought
     _last: list[_Pose] = field(default_factory=list)
+    _forms: list[tuple[Hashable, Brought]] = field(default_factory=list)
 
     @property
     def name(self) -> str:
@@ -237,10 +250,19 @@ class OneMesh:
         if time is None or model is None or self.playing is None:
             assert matrix is not None
             return self._carried(matrix)
-        vertices, normals = Mover(model, self.playing, matrix, self.start.baked).at(time)
+        form = model.form(time, self.playing)
+        if not self._forms:
+            self._forms.append((model.form(self.time, self.playing), self.start))
+        known = next((brought for one, brought in self._forms if one == form), None)
+        if known is None:
+            known = bring(self.item, self.start.asset, self.playing, time, matrix)
+            # The start is kept, and of the others the last.
+            self._forms[1:] = [(form, known)]
+            return known
+        vertices, normals = Mover(model, self.playing, matrix, known.baked).at(time)
         lights = _placed_lights(model.lights(time, self.playing), matrix)
-        baked = replace(self.start.baked, vertices=vertices, normals=normals)
-        return replace(self.start, baked=baked, lights=lights)
+        baked = replace(known.baked, vertices=vertices, normals=normals)
+        return replace(known, baked=baked, lights=lights)
 
     def _carried(self, matrix: FloatArray) -> Brought:
         """What it brings where a matrix (4, 4) has taken it."""

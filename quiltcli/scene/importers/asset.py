@@ -11,14 +11,17 @@ from quiltcli.formats.inputs import foreign_fault, open_input
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.formats.mesh.read import READERS, read_polygons
+from quiltcli.formats.usd import SUFFIXES as USD_SUFFIXES
 from quiltcli.scene.importers.gltf import read_gltf_model
 from quiltcli.scene.importers.model import Model
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.importers.polygons import parts_of_polygons
+from quiltcli.scene.importers.usd import read_usd_model
 
 MODELS: Mapping[str, Callable[[Path], Model]] = {
     ".gltf": read_gltf_model,
     ".glb": read_gltf_model,
+    **dict.fromkeys(USD_SUFFIXES, read_usd_model),
 }
 """Readers of scenes that may move, by suffix."""
 

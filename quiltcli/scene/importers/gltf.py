@@ -90,7 +90,7 @@ class GltfModel:
         """Number of channels that are not played, as a clip before theirs moves the same thing."""
         return contested(self.chosen(playing))
 
-    def form(self, seconds: float, playing: Playing) -> Hashable:
+    def form(self, seconds: float | None, playing: Playing | None) -> Hashable:
         """Nothing: triangles are the same at every time."""
         return None
 

@@ -95,7 +95,7 @@ class Model(Protocol):
     def contested(self, playing: Playing) -> int:
         """Number of movements that are not played, as another clip moves the same thing."""
 
-    def form(self, seconds: float, playing: Playing) -> Hashable:
+    def form(self, seconds: float | None, playing: Playing | None) -> Hashable:
         """What is equal at two times whose parts have the same vertices, triangles and surfaces."""
 
     def hidden(self, seconds: float, playing: Playing) -> bool:
