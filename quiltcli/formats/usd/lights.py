@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from quiltcli.formats.usd.stage import Stage, library
+from quiltcli.formats.usd.stage import Stage, file_of, library
 
 KINDS = ("DistantLight", "SphereLight", "RectLight", "DiskLight", "DomeLight", "DomeLight_1")
 _WIDEST = math.pi / 2
@@ -85,8 +85,8 @@ def _dome(read: _Reader, color: tuple[float, float, float], lost: tuple[str, ...
     if form not in ("automatic", "latlong"):
         words = f"is {form} (expected automatic or latlong)"
         raise read.stage.error(read.attribute("texture:format"), words)
-    file = asset.resolvedPath or read.stage.usd.GetRootLayer().ComputeAbsolutePath(asset.path)
-    return Lamp("environment", color, panorama=str(file), notices=lost)
+    file = file_of(read.attribute("texture:file"), asset)
+    return Lamp("environment", color, panorama=file, notices=lost)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from quiltcli.formats.usd.stage import Stage, library, path_of
+from quiltcli.formats.usd.stage import Stage, file_of, library, path_of
 from quiltcli.geometry import FloatArray
 
 _DEFAULTS: dict[str, Any] = {
@@ -181,12 +181,7 @@ class _Network:
                 shader.GetInput("file").GetAttr(),
                 f"is {asset.path!r}: pictures in UDIM tiles are not read (join them to one)",
             )
-        if asset.resolvedPath:
-            return str(asset.resolvedPath)
-        # Where it would be: beside the layer that names it.
-        stack = shader.GetInput("file").GetAttr().GetPropertyStack(self.time)
-        layer = stack[0].layer if stack else self.stage.usd.GetRootLayer()
-        return str(layer.ComputeAbsolutePath(asset.path))
+        return file_of(shader.GetInput("file").GetAttr(), asset)
 
     def _coordinates(self, shader: Any) -> tuple[str, tuple[float, ...]]:
         """The primvar a texture is looked up by, and how what it says is changed on the way."""

@@ -62,6 +62,15 @@ def path_of(prim: Any) -> str:
     return text if len(text) <= 120 else f"{text[:58]}…{text[-58:]}"
 
 
+def file_of(attribute: Any, asset: Any) -> str:
+    """The file that an attribute names; where it would be, beside the layer that says so, if it is not there."""
+    if asset.resolvedPath:
+        return str(asset.resolvedPath)
+    stack = attribute.GetPropertyStack()
+    layer = stack[0].layer if stack else attribute.GetStage().GetRootLayer()
+    return str(Path(layer.realPath).parent / asset.path)
+
+
 def library() -> Any:
     """The package `pxr`.
 
@@ -92,8 +101,7 @@ def open_stage(path: Path | str) -> Stage:
     try:
         usd = pxr.Usd.Stage.Open(str(path))
     except pxr.Tf.ErrorException as error:
-        words = f"is no USD file that can be read: {_reason(error)}"
-        raise MeshError(Problem(words, str(path))) from None
+        raise MeshError(_problem(path, error)) from None
     finally:
         heard.TakeUncoalescedDiagnostics()
     faults = list(dict.fromkeys(_one_line(str(error)) for error in usd.GetCompositionErrors()))
@@ -122,10 +130,14 @@ def _described(path: Path, usd: Any, pxr: Any) -> Stage:
     return Stage(path, usd, metres, geom.GetStageUpAxis(usd) == "Z", rate, span, tuple(notices))
 
 
-def _reason(error: Exception) -> str:
-    """What a library's error says, without the places in its own sources."""
+def _problem(path: Path, error: Exception) -> Problem:
+    """What the library's error says, without the places in its own sources."""
     found = re.findall(r"at line \d+ in file \S+ : '(.*?)'\s*(?:Error in|$)", str(error), re.DOTALL)
-    return _one_line(found[0] if found else str(error))
+    words = _one_line(found[0] if found else str(error))
+    place = re.match(re.escape(str(path)) + r":(\d+):(\d+): ", words)
+    line, column = (int(place[1]), int(place[2])) if place else (0, 0)
+    reason = words[place.end() :] if place else words
+    return Problem(f"is no USD file that can be read: {reason}", str(path), line, column)
 
 
 def _one_line(text: str) -> str:

@@ -41,11 +41,15 @@ def test_centimetres_are_hundredths(tmp_path):
 def test_a_stage_that_does_not_say_its_unit_is_in_centimetres_and_that_is_said(tmp_path):
     path = stage(tmp_path / "a.usda", mesh(), metersPerUnit=None)
     np.testing.assert_allclose(corners(path), np.array(SQUARE) / 100, rtol=0, atol=1e-17)
-    assert notices(path) == ("does not say its metersPerUnit: taken as centimetres ('units: 100' makes it metres)",)
+    assert notices(path) == (
+        "does not say its metersPerUnit: taken as centimetres ('units: 100' makes it metres)",
+    )
 
 
 def test_with_z_up_the_negative_y_axis_faces_the_worlds_z(tmp_path):
-    path = stage(tmp_path / "a.usda", mesh(points=[(1, 2, 3), (2, 2, 3), (1, 2, 4), (1, 2, 3.5)]), upAxis='"Z"')
+    path = stage(
+        tmp_path / "a.usda", mesh(points=[(1, 2, 3), (2, 2, 3), (1, 2, 4), (1, 2, 3.5)]), upAxis='"Z"'
+    )
     np.testing.assert_array_equal(parts_of(path)[0].vertices[0], (1, 3, -2))
 
 
@@ -58,7 +62,9 @@ def test_a_polygon_with_a_notch_is_covered_once(tmp_path):
 
 def test_a_hole_is_no_face(tmp_path):
     two = mesh(counts=[3, 3], indices=[0, 1, 2, 0, 2, 3], more="int[] holeIndices = [0]")
-    np.testing.assert_array_equal(corners(stage(tmp_path / "a.usda", two)), [[[0, 0, 0], [1, 1, 0], [0, 1, 0]]])
+    np.testing.assert_array_equal(
+        corners(stage(tmp_path / "a.usda", two)), [[[0, 0, 0], [1, 1, 0], [0, 1, 0]]]
+    )
 
 
 def test_left_handed_faces_are_wound_the_other_way(tmp_path):
@@ -75,7 +81,7 @@ def test_a_mirrored_place_keeps_the_front_in_front(tmp_path):
 
 
 def test_places_follow_one_another(tmp_path):
-    turn = 'float xformOp:rotateZ = 90\ndouble3 xformOp:translate = (1, 0, 0)'
+    turn = "float xformOp:rotateZ = 90\ndouble3 xformOp:translate = (1, 0, 0)"
     inner = xform("y", mesh(), ops=turn, order='"xformOp:translate", "xformOp:rotateZ"')
     found = parts_of(stage(tmp_path / "a.usda", moved("x", (0, 5, 0), inner)))[0].vertices
     np.testing.assert_allclose(found[1], (1, 6, 0), atol=1e-15)
@@ -108,7 +114,8 @@ def test_inactive_prims_and_classes_are_not_there(tmp_path):
 def test_native_instances_are_copies_of_one_part(tmp_path):
     kind = xform("kind", mesh()).replace("def", "class", 1)
     use = [
-        moved(f"at{x}", (x, 0, 0)).replace("()", "(instanceable = true\nreferences = </kind>)", 1) for x in (3, 7)
+        moved(f"at{x}", (x, 0, 0)).replace("()", "(instanceable = true\nreferences = </kind>)", 1)
+        for x in (3, 7)
     ]
     found = parts_of(stage(tmp_path / "a.usda", kind, *use))
     assert len(found) == 1
@@ -225,7 +232,10 @@ def test_cages_of_subdivided_surfaces_and_other_shapes_are_spoken_of(tmp_path):
 
 WRONG = {
     "points": (mesh(indices=[0, 1, 2, 4]), "/square.faceVertexIndices: names point 4 of 4 (expected 0 to 3)"),
-    "below": (mesh(indices=[0, 1, 2, -1]), "/square.faceVertexIndices: names point -1 of 4 (expected 0 to 3)"),
+    "below": (
+        mesh(indices=[0, 1, 2, -1]),
+        "/square.faceVertexIndices: names point -1 of 4 (expected 0 to 3)",
+    ),
     "counts": (
         mesh(counts=[5], indices=[0, 1, 2, 3]),
         "/square.faceVertexIndices: has 4 indices (expected 5, the sum of faceVertexCounts)",
@@ -264,7 +274,7 @@ WRONG = {
         "a.usda: Could not open asset @gone.usda@",
     ),
     "circle": (xform("x", meta="references = </x>"), "Cycle detected"),
-    "text": ("def Mesh {{{", "is no USD file that can be read"),
+    "text": ("def Mesh {{{", "a.usda:15:1: is no USD file that can be read: parse error"),
 }
 
 
@@ -285,12 +295,16 @@ def test_instancers_that_ask_for_too_much_are_refused(tmp_path):
     points = f"int[] protoIndices = [{row}]\npoint3f[] positions = [{at}]"
     inner = instancer(points, "</i/p/i/q>", mesh("q"))
     path = stage(tmp_path / "a.usda", instancer(points, body=xform("p", inner)))
-    with pytest.raises(MeshError, match=r"/i/p/i: shows 4,000,000 instances of 'q' \(expected at most 2,097,152\)"):
+    with pytest.raises(
+        MeshError, match=r"/i/p/i: shows 4,000,000 instances of 'q' \(expected at most 2,097,152\)"
+    ):
         parts_of(path)
 
 
 def test_without_the_extra_it_is_named(tmp_path, monkeypatch):
     path = stage(tmp_path / "a.usda", mesh())
     monkeypatch.setitem(__import__("sys").modules, "pxr", None)
-    with pytest.raises(MissingExtraError, match=r"A USD file needs usd-core, which is not installed .*\[usd\]"):
+    with pytest.raises(
+        MissingExtraError, match=r"A USD file needs usd-core, which is not installed .*\[usd\]"
+    ):
         parts_of(path)
