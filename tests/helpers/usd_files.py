@@ -66,7 +66,8 @@ def material(name: str, *inputs: str, nodes: str = "") -> str:
     lines = "\n".join(inputs)
     return (
         f'def Material "{name}"\n{{\ntoken outputs:surface.connect = </{name}/surface.outputs:surface>\n'
-        f'def Shader "surface"\n{{\nuniform token info:id = "UsdPreviewSurface"\n{lines}\ntoken outputs:surface\n}}\n'
+        f'def Shader "surface"\n{{\nuniform token info:id = "UsdPreviewSurface"\n{lines}\n'
+        "token outputs:surface\n}\n"
         f"{nodes}\n}}\n"
     )
 

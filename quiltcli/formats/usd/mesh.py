@@ -93,12 +93,18 @@ def read_faces(stage: Stage, mesh: Any, time: Any) -> Faces:
     shown[holes[(holes >= 0) & (holes < counts.size)]] = False
     number = np.flatnonzero(shown)
     start, place = some_rows(offsets(counts), number)
-    row, rank = segments(start)
+    row, _ = segments(start)
     if left:
-        # The first corner of a face stays its first.
-        place = place + np.where(rank == 0, 0, np.diff(start)[row] - 2 * rank)
+        place = place[turned(start)]
     corners = Corners(indices[place], number[row], place, vertices, counts.size, indices.size)
     return Faces(start, number, corners, key)
+
+
+def turned(start: IntArray) -> IntArray:
+    """The corners (C,) of faces the other way round, the first of each its first still."""
+    row, rank = segments(start)
+    result: IntArray = np.where(rank == 0, start[:-1][row], start[1:][row] - rank)
+    return result
 
 
 def read_points(stage: Stage, mesh: Any, time: Any, expected: int) -> FloatArray:

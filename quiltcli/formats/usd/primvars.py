@@ -146,4 +146,5 @@ def _numbered(one: Carried) -> IntArray:
 
 def _joined(a: IntArray, b: IntArray) -> IntArray:
     pairs = a.astype(np.int64) * (int(b.max(initial=0)) + 1) + b
-    return np.unique(pairs, return_inverse=True)[1].reshape(-1)
+    result: IntArray = np.unique(pairs, return_inverse=True)[1].reshape(-1)
+    return result

@@ -63,7 +63,7 @@ def path_of(prim: Any) -> str:
 
 
 def file_of(attribute: Any, asset: Any) -> str:
-    """The file that an attribute names; where it would be, beside the layer that says so, if it is not there."""
+    """The file that an attribute names; if it is not there, where it would be beside the layer."""
     if asset.resolvedPath:
         return str(asset.resolvedPath)
     stack = attribute.GetPropertyStack()

@@ -220,7 +220,7 @@ def test_subsets_of_faces_have_materials_of_their_own(tmp_path):
         found["n"].vertices[found["n"].triangles[0]], [(0, 0, 0), (1, 1, 0), (0, 1, 0)]
     )
     path.write_text(path.read_text().replace("indices = [1]", "indices = [2]"))
-    with pytest.raises(MeshError, match="/square/s.indices: names face 2 of 2"):
+    with pytest.raises(MeshError, match=r"/square/s\.indices: names face 2 of 2"):
         parts_of(path)
 
 
@@ -252,7 +252,7 @@ def test_what_is_not_drawn_of_a_material_is_said_once(tmp_path):
 
 def test_pictures_in_tiles_are_an_error(folder):
     with pytest.raises(
-        MeshError, match="/m/t.inputs:file: is 'a.<UDIM>.png': pictures in UDIM tiles are not read"
+        MeshError, match=r"/m/t\.inputs:file: is 'a\.<UDIM>\.png': pictures in UDIM tiles are not read"
     ):
         surface(folder, from_texture("diffuseColor"), nodes=texture(file="a.<UDIM>.png"))
 
