@@ -151,7 +151,7 @@ class FileLights(Model):
     type: Literal["file"] = "file"
     """Kind of light."""
     scale: NotNegative = 1.0
-    """Factor of their strength: 1 takes glTF's lux and candela by 683 lumens a watt, and USD's as they are."""
+    """Factor of their strength: 1 takes glTF's lux and candela by 683 lumens a watt, USD's as they are."""
     shadows: bool = False
     """Whether what stands in their way casts a shadow."""
 
