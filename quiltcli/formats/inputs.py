@@ -61,7 +61,6 @@ FOREIGN = (
     *(
         ".fbx",
         ".blend",
-        ".abc",
         ".dae",
         ".3ds",
         ".max",

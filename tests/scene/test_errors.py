@@ -48,7 +48,7 @@ def test_directory(tmp_path):
     assert message(tmp_path / "dir.obj") == "dir.obj: is a directory (expected a mesh file)"
 
 
-@pytest.mark.parametrize("suffix", ["fbx", "blend", "abc", "c4d", "FBX"])
+@pytest.mark.parametrize("suffix", ["fbx", "blend", "max", "c4d", "FBX"])
 def test_files_of_other_programs_say_what_to_do(tmp_path, suffix):
     found = message(written(tmp_path, f"car.{suffix}", b"\xe8\x00"))
     assert found == f"car.{suffix}: is a .{suffix.lower()} file, which is not read (export as GLB)"
@@ -58,7 +58,7 @@ def test_unknown_suffix(tmp_path):
     found = message(written(tmp_path, "car.xyz", "x"))
     assert (
         found
-        == "car.xyz: unknown mesh format '.xyz' (expected .obj, .ply, .off, .stl, .gltf, .glb, .usd, .usda, .usdc, .usdz)"
+        == "car.xyz: unknown mesh format '.xyz' (expected .obj, .ply, .off, .stl, .gltf, .glb, .usd, .usda, .usdc, .usdz, .abc)"
     )
 
 
@@ -66,7 +66,7 @@ def test_no_suffix(tmp_path):
     found = message(written(tmp_path, "car", "x"))
     assert (
         found
-        == "car: a mesh file without a suffix (expected .obj, .ply, .off, .stl, .gltf, .glb, .usd, .usda, .usdc, .usdz)"
+        == "car: a mesh file without a suffix (expected .obj, .ply, .off, .stl, .gltf, .glb, .usd, .usda, .usdc, .usdz, .abc)"
     )
 
 

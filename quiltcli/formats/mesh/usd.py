@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import MeshError, Problem
+from quiltcli.formats.corners import turned
 from quiltcli.formats.mesh.mesh import PolygonMesh
-from quiltcli.formats.usd.mesh import Asked, read_dress, read_faces, read_points, turned
+from quiltcli.formats.usd.mesh import Asked, read_dress, read_faces, read_points
 from quiltcli.formats.usd.places import Moment
 from quiltcli.formats.usd.stage import library, open_stage
 from quiltcli.formats.usd.walk import walk

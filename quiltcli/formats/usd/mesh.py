@@ -3,33 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from hashlib import blake2b
 from typing import Any
 
 import numpy as np
 
-from quiltcli.formats.usd.primvars import Carried, Corners, carried, read_primvar, variants
+from quiltcli.formats.corners import Carried, Dress, Faces, dressed, faces_of
+from quiltcli.formats.usd.primvars import read_normals, read_primvar
 from quiltcli.formats.usd.stage import Stage, library
-from quiltcli.geometry import FloatArray, IntArray, offsets, segments, some_rows
-
-_WHOLE = np.int64
-
-
-@dataclass(frozen=True, eq=False)
-class Faces:
-    """F faces of C corners, those that are holes left out, wound to the right-hand rule.
-
-    Attributes:
-        start: (F + 1,) offsets of the faces' corners.
-        number: (F,) of each face in the file.
-        corners: what the corners are in the file.
-        key: equal for equal faces.
-    """
-
-    start: IntArray
-    number: IntArray
-    corners: Corners
-    key: bytes
+from quiltcli.geometry import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -45,23 +26,6 @@ class Asked:
     uv: tuple[str, str] = ("", "")
     color: str = ""
     opacity: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Dress:
-    """What the corners (C,) of a mesh carry beside their normals.
-
-    Attributes:
-        uv: (C, 2) texture coordinates of two sets, v up, or None.
-        color: (C, 3) linear, or None.
-        opacity: (C, 1), or None.
-        variant: what tells corners of one vertex apart, or None.
-    """
-
-    uv: tuple[Carried | None, Carried | None]
-    color: Carried | None
-    opacity: Carried | None
-    variant: IntArray | None
 
 
 def read_faces(stage: Stage, mesh: Any, time: Any) -> Faces:
@@ -87,24 +51,7 @@ def read_faces(stage: Stage, mesh: Any, time: Any) -> Faces:
         raise stage.error(mesh.GetFaceVertexIndicesAttr(), words)
     holes = _whole(mesh.GetHoleIndicesAttr().Get(time))
     left = mesh.GetOrientationAttr().Get(time) == "leftHanded"
-    known = b"".join((counts.tobytes(), indices.tobytes(), holes.tobytes(), bytes([left])))
-    key = blake2b(known, digest_size=16).digest()
-    shown = np.ones(counts.size, np.bool_)
-    shown[holes[(holes >= 0) & (holes < counts.size)]] = False
-    number = np.flatnonzero(shown)
-    start, place = some_rows(offsets(counts), number)
-    row, _ = segments(start)
-    if left:
-        place = place[turned(start)]
-    corners = Corners(indices[place], number[row], place, vertices, counts.size, indices.size)
-    return Faces(start, number, corners, key)
-
-
-def turned(start: IntArray) -> IntArray:
-    """The corners (C,) of faces the other way round, the first of each its first still."""
-    row, rank = segments(start)
-    result: IntArray = np.where(rank == 0, start[:-1][row], start[1:][row] - rank)
-    return result
+    return faces_of(counts, indices, vertices, holes, left_handed=left)
 
 
 def read_points(stage: Stage, mesh: Any, time: Any, expected: int) -> FloatArray:
@@ -119,19 +66,6 @@ def read_points(stage: Stage, mesh: Any, time: Any, expected: int) -> FloatArray
         words = f"has {len(points):,} points at time code {time} (expected {expected:,})"
         raise stage.error(mesh.GetPointsAttr(), words)
     return points
-
-
-def read_normals(stage: Stage, mesh: Any, corners: Corners, time: Any) -> Carried | None:
-    """Normals of a mesh's corners, those of the primvar before those of the schema; None without any."""
-    pxr = library()
-    primvar = pxr.UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
-    found = read_primvar(stage, primvar, corners, 3, time)
-    if found is not None:
-        return found
-    values = mesh.GetNormalsAttr().Get(time)
-    if values is None or not len(values):
-        return None
-    return carried(stage, mesh.GetNormalsAttr(), values, mesh.GetNormalsInterpolation(), corners, 3)
 
 
 def read_dress(stage: Stage, mesh: Any, faces: Faces, asked: Asked, time: Any, *, moving: bool) -> Dress:
@@ -156,11 +90,8 @@ def read_dress(stage: Stage, mesh: Any, faces: Faces, asked: Asked, time: Any, *
         return read_primvar(stage, primvar, faces.corners, width, time)
 
     sets = get(asked.uv[0], 2), get(asked.uv[1], 2)
-    color, opacity = get(asked.color, 3), get(asked.opacity, 1)
     normals = read_normals(stage, mesh, faces.corners, time)
-    apart = [] if normals is None or not moving or not normals.by_face else [normals.row]
-    worn = [one for one in (*sets, color, opacity, None if apart else normals) if one is not None]
-    return Dress(sets, color, opacity, variants(worn, apart))
+    return dressed(sets, get(asked.color, 3), get(asked.opacity, 1), normals, moving=moving)
 
 
 def subset_rows(stage: Stage, subsets: list[tuple[Any, int]], faces: Faces) -> IntArray:
@@ -186,4 +117,4 @@ def subset_rows(stage: Stage, subsets: list[tuple[Any, int]], faces: Faces) -> I
 
 
 def _whole(values: Any) -> IntArray:
-    return np.zeros(0, _WHOLE) if values is None else np.asarray(values, dtype=_WHOLE).reshape(-1)
+    return np.zeros(0, np.int64) if values is None else np.asarray(values, dtype=np.int64).reshape(-1)

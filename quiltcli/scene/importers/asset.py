@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from quiltcli.errors import MeshError, Problem, SceneError
+from quiltcli.formats.alembic import SUFFIXES as ALEMBIC_SUFFIXES
 from quiltcli.formats.inputs import foreign_fault, open_input
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.formats.mesh.read import READERS, read_polygons
 from quiltcli.formats.usd import SUFFIXES as USD_SUFFIXES
+from quiltcli.scene.importers.alembic import read_alembic_model
 from quiltcli.scene.importers.gltf import read_gltf_model
 from quiltcli.scene.importers.model import Model
 from quiltcli.scene.importers.part import Part
@@ -22,6 +24,7 @@ MODELS: Mapping[str, Callable[[Path], Model]] = {
     ".gltf": read_gltf_model,
     ".glb": read_gltf_model,
     **dict.fromkeys(USD_SUFFIXES, read_usd_model),
+    **dict.fromkeys(ALEMBIC_SUFFIXES, read_alembic_model),
 }
 """Readers of scenes that may move, by suffix."""
 

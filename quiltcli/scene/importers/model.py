@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from quiltcli.errors import MeshError, Problem
 from quiltcli.geometry import FloatArray, normalized
 from quiltcli.scene.importers.part import Part
 
@@ -73,6 +74,18 @@ def triple(values: FloatArray) -> Triple:
     """Three numbers of an array (3,)."""
     x, y, z = (float(v) for v in values)
     return x, y, z
+
+
+ONLY_CLIP = "animation 1"
+"""Name of the animation of files that have one without a name."""
+
+
+def check_only_clip(path: str, playing: Playing) -> None:
+    """Raise a `MeshError` where another animation is asked for than the only one."""
+    wanted = (playing.clips,) if isinstance(playing.clips, str) else playing.clips
+    for name in wanted:
+        if name not in ("all", ONLY_CLIP):
+            raise MeshError(Problem(f"has no animation {name!r} (it has one, {ONLY_CLIP!r})", path))
 
 
 class Model(Protocol):

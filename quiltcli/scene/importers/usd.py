@@ -9,51 +9,33 @@ from typing import Any
 
 import numpy as np
 
-from quiltcli.errors import MeshError, Problem, counted
-from quiltcli.formats.gltf.posing import carried, copied_triangles
-from quiltcli.formats.mesh import PolygonMesh
-from quiltcli.formats.usd.clock import Movement, movement
-from quiltcli.formats.usd.mesh import (
-    Dress,
-    Faces,
-    read_dress,
-    read_faces,
-    read_normals,
-    read_points,
-    subset_rows,
-)
+from quiltcli.errors import counted
+from quiltcli.formats.corners import Faces
+from quiltcli.formats.usd.changes import Movement, movement
+from quiltcli.formats.usd.mesh import read_dress, read_faces, read_points, subset_rows
 from quiltcli.formats.usd.places import Moment
+from quiltcli.formats.usd.primvars import read_normals
 from quiltcli.formats.usd.skins import skinned
 from quiltcli.formats.usd.stage import Stage, library, open_stage
 from quiltcli.formats.usd.walk import Piece, Shown, walk
 from quiltcli.geometry import FloatArray
-from quiltcli.scene.importers.model import FileLight, Playing
+from quiltcli.scene.importers.cuts import (
+    MOST_TRIANGLES,
+    Form,
+    Look,
+    Posed,
+    at_one_place,
+    form_of,
+    joined,
+    part_of,
+    placed_cut,
+)
+from quiltcli.scene.importers.model import ONLY_CLIP, FileLight, Playing, check_only_clip
 from quiltcli.scene.importers.part import Part
-from quiltcli.scene.importers.polygons import Cut, cut_polygons
 from quiltcli.scene.importers.usd_lights import lights_at, lights_lost
 from quiltcli.scene.importers.usd_surfaces import lost, surface_of, uv_names
 
-MOST_TRIANGLES = 2**26
-CLIP = "animation 1"
-"""Name of a stage's animation, of which there is one."""
 _KEPT = 2
-
-
-@dataclass(frozen=True, eq=False)
-class _Form:
-    """A mesh cut into triangles, as long as its faces stay the same.
-
-    Attributes:
-        faces: the faces.
-        dress: what their corners carry.
-        cuts: triangles by materials.
-        flaws: what of the mesh cannot be drawn.
-    """
-
-    faces: Faces
-    dress: Dress
-    cuts: tuple[Cut, ...]
-    flaws: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +51,13 @@ class UsdModel:
     stage: Stage
     shown: Shown
     movement: Movement
-    _forms: dict[int, dict[bytes, _Form]] = field(default_factory=dict)
-    _points: dict[int, tuple[FloatArray, FloatArray | None]] = field(default_factory=dict)
+    _forms: dict[int, dict[bytes, Form]] = field(default_factory=dict)
+    _points: dict[int, Posed] = field(default_factory=dict)
 
     @property
     def clips(self) -> tuple[str, ...]:
         """The one animation there may be."""
-        return () if self.movement.clock is None else (CLIP,)
+        return () if self.movement.clock is None else (ONLY_CLIP,)
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -98,11 +80,7 @@ class UsdModel:
 
     def check(self, playing: Playing) -> None:
         """Raise a `MeshError` unless the animations that are asked for are there."""
-        wanted = (playing.clips,) if isinstance(playing.clips, str) else playing.clips
-        for name in wanted:
-            if name not in ("all", CLIP):
-                words = f"has no animation {name!r} (a stage has one, {CLIP!r})"
-                raise MeshError(Problem(words, str(self.stage.path)))
+        check_only_clip(str(self.stage.path), playing)
 
     def contested(self, playing: Playing) -> int:
         """Nothing is moved twice by one animation."""
@@ -143,19 +121,13 @@ class UsdModel:
         """Vertices and normals (V, 3) of all parts after one another at a time."""
         moment = self._moment(seconds, playing)
         everything = self._all_hidden(moment)
-        vertices, normals = [np.empty((0, 3))], [np.empty((0, 3))]
+        placed = []
         for number, piece in enumerate(self.shown.pieces):
-            places = self._places(moment, piece, everything)
-            points, directions = self._posed(number, moment)
+            places, posed = self._places(moment, piece, everything), self._posed(number, moment)
             form = self._form(number, moment)
-            for cut in form.cuts:
-                there = carried(*_cut(form, cut, points, directions), places)
-                vertices.append(there.vertices)
-                normals.append(np.zeros_like(there.vertices) if there.normals is None else there.normals)
-        joined = np.concatenate(vertices)
-        if everything and len(joined):
-            joined = np.repeat(joined[:1], len(joined), axis=0)
-        return joined, np.concatenate(normals)
+            placed += [placed_cut(form, cut, posed, places) for cut in form.cuts]
+        vertices, normals = joined(placed)
+        return at_one_place(vertices) if everything else vertices, normals
 
     def lights(self, seconds: float | None = None, playing: Playing | None = None) -> tuple[FileLight, ...]:
         """The stage's lights at a time."""
@@ -187,8 +159,7 @@ class UsdModel:
         """Count before anything is copied: a small file can ask for very much."""
         total = 0
         for number, piece in enumerate(self.shown.pieces):
-            own = sum(len(cut.triangles) for cut in self._form(number, moment).cuts)
-            total += own * len(self._places(moment, piece, everything))
+            total += self._form(number, moment).triangles * len(self._places(moment, piece, everything))
             if total > MOST_TRIANGLES:
                 words = f"and all before it show {total:,} triangles (expected at most {MOST_TRIANGLES:,})"
                 raise self.stage.error(piece.prim, words)
@@ -196,7 +167,7 @@ class UsdModel:
     def _key(self, number: int, moment: Moment) -> bytes:
         return read_faces(self.stage, self.shown.pieces[number].mesh, moment.time).key
 
-    def _form(self, number: int, moment: Moment) -> _Form:
+    def _form(self, number: int, moment: Moment) -> Form:
         """A mesh's triangles at a time; the last ones are kept."""
         kept = self._forms.setdefault(number, {})
         if kept and number not in self.movement.forms:
@@ -209,83 +180,42 @@ class UsdModel:
                 kept.pop(next(iter(kept)))
         return kept[faces.key]
 
-    def _made(self, piece: Piece, faces: Faces, time: Any, *, moving: bool) -> _Form:
+    def _made(self, piece: Piece, faces: Faces, time: Any, *, moving: bool) -> Form:
         mesh = piece.mesh
         dress = read_dress(self.stage, mesh, faces, piece.asked(uv_names(piece)), time, moving=moving)
         points = read_points(self.stage, mesh, time, faces.corners.vertices)
-        polygons = PolygonMesh(
-            vertices=points,
-            corner_start=faces.start,
-            corners=faces.corners.vertex,
-            uv=None,
-            names=("",) * len(faces.number),
-            lines=np.zeros(len(faces.number), dtype=np.int64),
-            path=str(self.stage.path),
-            variant=dress.variant,
-            material=subset_rows(self.stage, list(piece.subsets), faces),
-        )
-        found = cut_polygons(polygons)
-        flaws = []
-        if found.too_small:
-            flaws.append(f"{counted(found.too_small, 'face')} of fewer than 3 corners dropped")
-        if found.coverage.crossing:
-            count = counted(found.coverage.crossing, "face")
-            flaws.append(f"{count} whose outline crosses itself, which no triangles can cover")
-        return _Form(faces, dress, tuple(found.cuts), tuple(flaws))
+        rows = subset_rows(self.stage, list(piece.subsets), faces)
+        return form_of(str(self.stage.path), faces, dress, points, rows)
 
-    def _posed(self, number: int, moment: Moment) -> tuple[FloatArray, FloatArray | None]:
-        """Points (V, 3) of a mesh and normals (C, 3) of its corners at a time; those that rest are kept."""
+    def _posed(self, number: int, moment: Moment) -> Posed:
+        """A mesh at a time; those that rest are kept."""
         if number in self._points:
             return self._points[number]
         piece, form = self.shown.pieces[number], self._form(number, moment)
         points = read_points(self.stage, piece.mesh, moment.time, form.faces.corners.vertices)
-        normals = None
-        if piece.skin is None:
-            found = read_normals(self.stage, piece.mesh, form.faces.corners, moment.time)
-            normals = None if found is None else found.at_corners
+        if piece.skin is not None:
+            posed = Posed(skinned(piece.prim, piece.skin, moment, points), None)
         else:
-            points = skinned(piece.prim, piece.skin, moment, points)
+            normals = read_normals(self.stage, piece.mesh, form.faces.corners, moment.time)
+            posed = Posed(points, None if normals is None else normals.at_corners)
         if number not in self.movement.points and number not in self.movement.forms:
-            self._points[number] = points, normals
-        return points, normals
+            self._points[number] = posed
+        return posed
 
-    def _parts(
-        self, piece: Piece, form: _Form, posed: tuple[FloatArray, FloatArray | None], places: FloatArray
-    ) -> Iterator[Part]:
+    def _parts(self, piece: Piece, form: Form, posed: Posed, places: FloatArray) -> Iterator[Part]:
         """The parts of a mesh, one for each material."""
         double = bool(piece.mesh.GetDoubleSidedAttr().Get())
-        names = uv_names(piece)
+        color, opacity = form.dress.color, form.dress.opacity
+        faint = opacity is not None and bool((opacity.values < 1).any())
         for cut in form.cuts:
-            there = carried(*_cut(form, cut, *posed), places)
             material = piece.materials[cut.row]
-            corner, copies = cut.corner, len(places)
-            uv = [
-                None if one is None else np.tile(one.at_corners[corner], (copies, 1)) for one in form.dress.uv
-            ]
-            color, opacity = form.dress.color, form.dress.opacity
-            worn = material is None or material.color
-            faint = material is None or material.opacity
-            yield Part(
-                vertices=there.vertices,
-                triangles=copied_triangles(cut.triangles, len(corner), there.mirrored),
-                normals=there.normals,
-                colors=np.tile(color.at_corners[corner], (copies, 1)).astype(np.float32)
-                if color is not None and worn
-                else None,
-                surface=surface_of(
-                    material,
-                    names,
-                    colored=color is not None,
-                    faint=opacity is not None and bool((opacity.values < 1).any()),
-                    double_sided=double,
-                ),
-                uv=uv[0],
-                uv1=uv[1],
-                material="" if material is None else material.name,
-                opacities=np.tile(opacity.at_corners[corner, 0], copies).astype(np.float32)
-                if opacity is not None and faint and (opacity.values < 1).any()
-                else None,
+            surface = surface_of(
+                material, uv_names(piece), colored=color is not None, faint=faint, double_sided=double
             )
+            look = Look(surface)
+            if material is not None:
+                look = Look(surface, material.name, bool(material.color), bool(material.opacity))
+            yield part_of(form, cut, posed, places, look)
 
 
 def read_usd_model(path: Path) -> UsdModel:
@@ -299,11 +229,3 @@ def read_usd_model(path: Path) -> UsdModel:
     time = library().Usd.TimeCode
     shown = walk(stage, time.EarliestTime() if stage.range is None else time(stage.range[0]))
     return UsdModel(stage, shown, movement(stage, shown))
-
-
-def _cut(
-    form: _Form, cut: Cut, points: FloatArray, normals: FloatArray | None
-) -> tuple[FloatArray, FloatArray | None]:
-    """Points and normals (V, 3) of the vertices of a cut."""
-    own = points[form.faces.corners.vertex[cut.corner]]
-    return own, None if normals is None else normals[cut.corner]

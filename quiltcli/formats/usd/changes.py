@@ -1,4 +1,4 @@
-"""The time of a stage: seconds to time codes, and what of a stage changes."""
+"""What of a stage changes over time."""
 
 from __future__ import annotations
 
@@ -6,43 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from quiltcli.formats.clock import Clock
 from quiltcli.formats.usd.places import Instancer, Place
 from quiltcli.formats.usd.stage import Stage, library, path_of
 from quiltcli.formats.usd.walk import Piece, Shown
-
-_GRID = 2**20
-"""Time codes are whole 2^-20ths, so that frames meet samples and held values change on time."""
-
-
-@dataclass(frozen=True)
-class Clock:
-    """When a stage's animation runs.
-
-    Attributes:
-        first: time code at which it begins.
-        last: at which it ends.
-        rate: time codes a second.
-    """
-
-    first: float
-    last: float
-    rate: float
-
-    def code(self, seconds: float, after: str) -> float:
-        """Time code at a time: second 0 is time code 0, whenever the animation begins.
-
-        Args:
-            seconds: of the scene.
-            after: what comes after its end: `hold`, `loop` or `bounce`.
-        """
-        code = round(seconds * self.rate * _GRID) / _GRID
-        length = self.last - self.first
-        if after == "hold" or length <= 0:
-            return min(max(code, self.first), self.last)
-        if after == "loop":
-            return self.first + (code - self.first) % length
-        there = (code - self.first) % (2 * length)
-        return self.first + min(there, 2 * length - there)
 
 
 @dataclass
