@@ -302,7 +302,7 @@ CASES = [
     Case("job: a mesh as display", [swap(JOB, "display: display.yaml", "display: walls.obj")], [],
          "job.yaml:2:10: display: expected a YAML file (.yaml, .yml), got the suffix '.obj'"),
     Case("scene: no mesh", [swap(SCENE, "name: ball, mesh: ball.obj,", "name: ball,")], [],
-         "scene.yaml:3:3: objects[0].mesh: missing key (OBJ, PLY, OFF, STL, glTF, USD or Alembic; with a run of # for a number, such as boat.####.ply, one a frame)"),
+         "scene.yaml:3:3: objects[0].mesh: missing key (OBJ, PLY, OFF, STL, glTF, USD or Alembic; with # for a number, such as boat.####.ply, one a frame)"),
     Case("yaml: alias", [swap(JOB, "[0, 0, 2]", "&a [*a]")], [],
          "job.yaml:10:28: an alias refers to itself"),
     Case("yaml: tag", [swap(JOB, "far: 50", "far: !!python/name:os.system 50")], [],
