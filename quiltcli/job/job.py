@@ -402,7 +402,7 @@ class JobFile(FileModel):
     layout: LayoutChoice | None = None
     """Layout file, or how to pack; the display's own layout or the packing defaults when absent."""
     scene: ScenePath
-    """Scene file, or a mesh or glTF file."""
+    """Scene file, or a mesh, glTF or USD file."""
     lightfield: YamlPath | None = None
     """Light field file, photographs for a 360° light field display to show, instead of `scene`."""
     frames: FrameRange
