@@ -6,7 +6,7 @@ colour c adds T·α·c, and T becomes T·(1 − α) (Porter & Duff 1984, over). 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from quiltcli.shading.materials import albedo_wants, alpha_at, at_materials
 from quiltcli.shading.shadows import CENTRE, Sample
 from quiltcli.visibility.draw import Drawing, Wanted
 from quiltcli.visibility.resolve.hits import Points
+from quiltcli.visibility.resolve.layers import LayerHits
 
 _ONE = np.float32(1)
 _OPAQUE, _MASK = ALPHAS.index("opaque"), ALPHAS.index("mask")
@@ -78,12 +79,31 @@ def layers(
         eye: (3,) from where it is seen.
         sample: which sample of its pixels was drawn.
     """
-    if drawing.soft is None:
-        return
-    passed = np.ones(drawing.soft.pixel.size, dtype=np.float32)
-    light = np.ones(passed.size, dtype=np.bool_)
-    seen = np.zeros(passed.size, dtype=np.bool_)
-    for one in drawing.layers(light, wanted | opacity_wants(scene), scene):
+    if drawing.soft is not None:
+        light = np.ones(drawing.soft.pixel.size, dtype=np.bool_)
+        found = drawing.layers(light, wanted | opacity_wants(scene), scene)
+        yield from blended(found, light, scene, eye, sample)
+
+
+def blended(
+    found: Iterable[LayerHits],
+    light: BoolArray,
+    scene: Scene,
+    eye: FloatArray,
+    sample: Sample = CENTRE,
+) -> Iterator[Layer]:
+    """Layers with the share of their pixels' light that each has.
+
+    Args:
+        found: the hits of all layers, the nearest first; with what `opacity_wants`.
+        light: (n,) pixels that light still passes, of which their rows tell; kept up to date.
+        scene: what is seen.
+        eye: (3,) from where it is seen.
+        sample: which sample of its pixels they are.
+    """
+    passed = np.ones(light.size, dtype=np.float32)
+    seen = np.zeros(light.size, dtype=np.bool_)
+    for one in found:
         opacity = opacity_at(scene, one.hits.points).reshape(-1)
         through = passed.take(one.row)
         some = opacity > 0

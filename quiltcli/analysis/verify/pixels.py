@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
@@ -100,9 +100,8 @@ class Sighting:
 
     def take(self, rows: IntArray) -> Sighting:
         """The sighting of some of the pixels."""
-        values = {f.name: getattr(self.pixels, f.name)[rows] for f in fields(Places)}
         return Sighting(
-            Places(**values),
+            self.pixels.take(rows),
             self.named[:, rows],
             self.z[rows],
             self.drawn[rows],

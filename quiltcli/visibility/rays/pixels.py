@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -44,6 +44,10 @@ class Places:
         x, y = self.x + (0.5 + dx), self.y + (0.5 + dy)
         ray = self.ray
         return normalized(ray[:, :, 0] * x[:, None] + ray[:, :, 1] * y[:, None] + ray[:, :, 2])
+
+    def take(self, rows: IntArray) -> Places:
+        """Some of the pixels."""
+        return Places(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
 
 def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> Places:
