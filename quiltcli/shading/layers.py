@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array
 from quiltcli.scene import Scene
 from quiltcli.scene.scene import ALPHAS
 from quiltcli.shading.adaptive import Shaded
@@ -22,7 +22,7 @@ from quiltcli.visibility.resolve.hits import Points
 from quiltcli.visibility.resolve.layers import LayerHits
 
 _ONE = np.float32(1)
-_OPAQUE, _MASK = ALPHAS.index("opaque"), ALPHAS.index("mask")
+OPAQUE, MASK = ALPHAS.index("opaque"), ALPHAS.index("mask")
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,14 @@ class Layer:
 
 def opacity_at(scene: Scene, seen: Points) -> Float32Array:
     """The share of light (n, k) that points hold up."""
+    alpha, means, cutoff = alpha_of(scene, seen)
+    alpha = np.where(means == MASK, (alpha >= cutoff).astype(np.float32), alpha)
+    alpha = np.where(means == OPAQUE, _ONE, alpha)
+    return np.asarray(np.minimum(np.maximum(alpha, np.float32(0)), _ONE), dtype=np.float32)
+
+
+def alpha_of(scene: Scene, seen: Points) -> tuple[Float32Array, Int32Array, Float32Array]:
+    """Alpha (n, k) of points, what it means (n, k), an index into `ALPHAS`, and the least a mask shows."""
     table = scene.materials
     assert table.opacity is not None
     assert table.alpha is not None
@@ -56,9 +64,7 @@ def opacity_at(scene: Scene, seen: Points) -> Float32Array:
         alpha = alpha * (first + seen.weights[0] * second + seen.weights[1] * third)
     means = table.alpha.take(scene.material.take(seen.triangle))
     cutoff = table.cutoff.take(scene.material.take(seen.triangle))
-    alpha = np.where(means == _MASK, (alpha >= cutoff).astype(np.float32), alpha)
-    alpha = np.where(means == _OPAQUE, _ONE, alpha)
-    return np.asarray(np.minimum(np.maximum(alpha, np.float32(0)), _ONE), dtype=np.float32)
+    return np.asarray(np.broadcast_to(alpha, means.shape)), means, cutoff
 
 
 def opacity_wants(scene: Scene) -> Wanted:

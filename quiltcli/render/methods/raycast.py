@@ -160,9 +160,7 @@ def ray_hits(
         normals: the scene's `corner_normals`.
         sloped: whether textures are looked up.
     """
-    x, y = (pixels.x + 0.5)[:, None], (pixels.y + 0.5)[:, None]
-    matrix = pixels.ray
-    ray = matrix[:, :, 0] * x + matrix[:, :, 1] * y + matrix[:, :, 2]
+    ray = pixels.rays()
     position = ray * plane_distance(target, triangle, ray)[:, None]
     points = np.ascontiguousarray(position.T)
     return point_hits(
@@ -174,7 +172,7 @@ def ray_hits(
         depth=target.viewer.depth_of(points),
         normals=normals,
         inside=int(np.count_nonzero(~pixels.bleed)),
-        slopes=weight_slopes(target, triangle, matrix, ray, position) if sloped else None,
+        slopes=weight_slopes(target, triangle, pixels.ray, ray, position) if sloped else None,
     )
 
 
