@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.scene import Scene
-from quiltcli.shading.layers import MASK, OPAQUE, alpha_of
+from quiltcli.shading.opacity import MASK, OPAQUE, alpha_of
 from quiltcli.visibility.rays.embree import UNSURE, Target, cast, plane_distance
 from quiltcli.visibility.rays.pixels import Places
 from quiltcli.visibility.rays.weights import barycentric, weight_slopes
