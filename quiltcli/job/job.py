@@ -153,6 +153,8 @@ class RenderSpec(Model):
 
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
+    sample_shading: bool = False
+    """Work light out at every sample of a pixel, not once for a triangle and pixel where it is smooth."""
     shutter: Unit = 0.0
     """How long the shutter is open from the frame's time on, as a share of a frame: motion blur."""
     motion_samples: Annotated[int, Field(ge=1, le=MOST_TIMES)] = 16

@@ -110,7 +110,7 @@ def method_problems(job: JobFile, facets: Facets) -> list[Problem]:
     if how.depth_bits is not None:
         words = "a depth buffer of so many bits belongs to flat facets, and the display has curved ones"
         return [source.problem("depth_bits", f"{words} (expected no such key)")]
-    if "motion" in job.output.channels:
-        words = "motion is told on flat facets alone, and the display has curved ones"
+    if how.method == "tessellate" and "motion" in job.output.channels:
+        words = "tessellate does not tell motion (expected homography or raycast)"
         return [job.output.source.problem("channels", words)]
     return []

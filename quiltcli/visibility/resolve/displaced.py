@@ -32,12 +32,12 @@ class DisplacedTiles(MixedTiles):
         keys = self.reader.canvas.keys.take(self.tiles.index, axis=0)
         pixel, places, inside = owned_pixels(self.reader.blocks, self.tiles, keys != 0)
         keys = keys.reshape(-1).take(pixel)
-        rays = _rays(self.reader, self.tiles, self.samples, pixel)
+        rays = rays_of(self.reader, self.samples, self.tiles, pixel)
         return pixel_hits(self.reader, self.tiles, keys, pixel, places, inside, rays)
 
 
-def _rays(reader: Reader, tiles: Tiles, samples: Samples, pixel: IntArray) -> Rays:
-    """Rays of those pixels (G,) of microtiles, which go through where the samples are."""
+def rays_of(reader: Reader, samples: Samples, tiles: Tiles, pixel: IntArray) -> Rays:
+    """Rays of pixels (G,) of microtiles of patches, counted through all of these."""
     limits = reader.limits
     # All pixels of microtiles, for a matrix each is less to move than one a pixel.
     x, y = (samples.place[k].take(tiles.index, axis=0) for k in (0, 1))
