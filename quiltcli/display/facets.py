@@ -164,6 +164,11 @@ def demand_place(facets: Facets, what: str) -> None:
         raise DisplayError(Problem(words, facets.path))
 
 
+def eyes_apart(facets: Facets) -> bool:
+    """Whether pixels of a facet have eyes of their own, beside the head."""
+    return any(chart is not None and chart.omni is not None for chart in facets.charts)
+
+
 def display_points(facets: Facets) -> FloatArray:
     """Points (N, 3) all over a display: corners of flat facets, places on curved ones, world metres.
 

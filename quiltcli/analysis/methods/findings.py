@@ -171,10 +171,12 @@ def _part(
     differ = np.flatnonzero((named != right) & (named >= 0))
     pixels = places(at[differ], stage.layout, stage.owners, rays)
     directions = pixels.directions()
-    far = plane_depth(target, named[differ], directions)
+    far = plane_depth(target, named[differ], directions, pixels.origin)
     nearest = np.full(differ.size, -np.inf)
     hit = right[differ] >= 0
-    nearest[hit] = plane_depth(target, right[differ][hit], directions[hit])
+    nearest[hit] = plane_depth(
+        target, right[differ][hit], directions[hit], pixels.from_eye(np.flatnonzero(hit))
+    )
     beyond = far > nearest + _SAME * np.abs(np.where(hit, nearest, 0.0))
     wrong = np.zeros(at.size, dtype=np.bool_)
     wrong[differ] = beyond

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
@@ -100,9 +100,8 @@ class Sighting:
 
     def take(self, rows: IntArray) -> Sighting:
         """The sighting of some of the pixels."""
-        values = {f.name: getattr(self.pixels, f.name)[rows] for f in fields(Places)}
         return Sighting(
-            Places(**values),
+            self.pixels.take(rows),
             self.named[:, rows],
             self.z[rows],
             self.drawn[rows],
@@ -114,12 +113,13 @@ class Sighting:
 def sight(trial: Trial, address: IntArray) -> Sighting:
     """Cast the five rays of the pixels at `address` (P,), and look at the images there."""
     pixels = places(address, trial.layout, trial.owners, trial.rays)
-    named = np.stack([cast(trial.target, pixels.directions(*offset)) for offset in OFFSETS])
+    begin = pixels.origin
+    named = np.stack([cast(trial.target, pixels.directions(*way), origin=begin) for way in OFFSETS])
     centre = pixels.directions()
     plane = np.full(named.shape, np.inf)
     for k, row in enumerate(named):
         hit = np.flatnonzero(row >= 0)
-        plane[k, hit] = plane_depth(trial.target, row[hit], centre[hit])
+        plane[k, hit] = plane_depth(trial.target, row[hit], centre[hit], pixels.from_eye(hit))
     drawn = trial.images.triangle(address)
     z = trial.images.depth(address)
     unknown = np.full(address.size, -1)
@@ -170,7 +170,7 @@ def _faults(trial: Trial, seen: Sighting) -> tuple[Kinds, IntArray, IntArray]:
         some = seen.take(rows)
         centre = some.pixels.directions()
         start = np.where(some.named[0] >= 0, _distance(trial.target, some, centre), 0.0)
-        behind = cast(trial.target, centre, start * (1 + 1e-6))
+        behind = cast(trial.target, centre, start * (1 + 1e-6), some.pixels.origin)
         named = np.concatenate((some.named, behind[None]))
         verdict[rows], shown[rows] = judge(
             trial.target, trial.neighbours, some.pixels, named, some.drawn, some.z
@@ -180,7 +180,7 @@ def _faults(trial: Trial, seen: Sighting) -> tuple[Kinds, IntArray, IntArray]:
 
 def _distance(target: Target, some: Sighting, centre: FloatArray) -> FloatArray:
     """Distance (P,) along unit rays to the first hit's plane; 0 where that is nowhere."""
-    distance = plane_distance(target, np.maximum(some.named[0], 0), centre)
+    distance = plane_distance(target, np.maximum(some.named[0], 0), centre, some.pixels.origin)
     return np.where(np.isfinite(distance) & (distance > 0), distance, 0.0)
 
 

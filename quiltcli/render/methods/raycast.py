@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from quiltcli.display import lit_facets
+from quiltcli.display import eyes_apart, lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
 from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
@@ -98,7 +98,15 @@ def target_of(stage: Stage, viewer: Viewer) -> Target:
         how.backface_culling,
         one_sided=scene.one_sided if how.double_sided == "file" else None,
         invisible=scene.invisible,
+        beside=_beside(stage, viewer),
     )
+
+
+def _beside(stage: Stage, viewer: Viewer) -> float:
+    """How far from the eye rays may begin, metres: where each has an eye of its own."""
+    if viewer.head is None or not eyes_apart(stage.facets):
+        return 0.0
+    return 2 * float(np.sqrt(dot(viewer.eye - viewer.head, viewer.eye - viewer.head)))
 
 
 def pixels_of(stage: Stage, lit: BoolArray) -> Iterator[IntArray]:
@@ -120,7 +128,9 @@ def cast_pixels(
     x, y = (pixels.x[rows] + 0.5)[:, None], (pixels.y[rows] + 0.5)[:, None]
     matrix = pixels.ray[rows]
     ray = matrix[:, :, 0] * x + matrix[:, :, 1] * y + matrix[:, :, 2]
-    position = ray * plane_distance(target, triangle, ray)[:, None]
+    begin = pixels.from_eye(rows)
+    seen = ray * plane_distance(target, triangle, ray, begin)[:, None]
+    position = seen if begin is None else begin + seen
     points = np.ascontiguousarray(position.T)
     return point_hits(
         first=pixels.address[rows],
@@ -128,10 +138,11 @@ def cast_pixels(
         triangle=triangle.astype(np.int32),
         position=points,
         weights=np.stack(barycentric(target, triangle, position)),
-        depth=target.viewer.depth_of(points),
+        depth=target.viewer.depth_of(np.ascontiguousarray(seen.T)),
         normals=normals,
         inside=int(np.count_nonzero(~pixels.bleed[rows])),
-        slopes=weight_slopes(target, triangle, matrix, ray, position) if sloped else None,
+        slopes=weight_slopes(target, triangle, matrix, ray, seen) if sloped else None,
+        ray=None if begin is None else np.ascontiguousarray(ray.T),
     )
 
 
@@ -156,7 +167,8 @@ def weight_slopes(
         triangle: (P,) which triangles.
         matrix: (P, 3, 3) page pixel (x, y, 1) → direction from the eye.
         ray: (P, 3) directions.
-        position: (P, 3) points minus the eye.
+        position: (P, 3) points minus where their rays begin. That neighbours may begin beside one another
+            is left out: it is little, and textures alone are filtered by it.
     """
     normal = target.plane[triangle, :3]
     along = dot(normal, ray)
@@ -172,8 +184,8 @@ def weight_slopes(
 
 def first_triangles(target: Target, neighbours: Neighbours, pixels: Places) -> IntArray:
     """The first triangle (P,) along the ray of every pixel, −1 for none."""
-    named = np.stack([cast(target, pixels.directions(*offset)) for offset in OFFSETS])
-    back = _looking_back(target, pixels.directions(), named[0])
+    named = np.stack([cast(target, pixels.directions(*way), origin=pixels.origin) for way in OFFSETS])
+    back = _looking_back(target, pixels, named[0])
     every = np.concatenate((named, back[None]))
     result: IntArray = np.maximum(named[0], -1)
     rows = np.flatnonzero((every != every[0]).any(axis=0))
@@ -182,18 +194,20 @@ def first_triangles(target: Target, neighbours: Neighbours, pixels: Places) -> I
     return result
 
 
-def _looking_back(target: Target, directions: FloatArray, first: IntArray) -> IntArray:
-    """What rays (P, 3) from just behind their first hits (P,) towards the eye meet.
+def _looking_back(target: Target, pixels: Places, first: IntArray) -> IntArray:
+    """What rays of P pixels from just behind their first hits (P,) towards the eye meet.
 
     Where that is nothing, or nothing was hit, it is `first` itself.
     """
     result: IntArray = first.copy()
     rows = np.flatnonzero(first >= 0)
     if rows.size:
-        distance = plane_distance(target, first[rows], directions[rows]) * (1 + _BEHIND)
+        directions, begin = pixels.directions()[rows], pixels.from_eye(rows)
+        distance = plane_distance(target, first[rows], directions, begin) * (1 + _BEHIND)
         distance = np.where(np.isfinite(distance), distance, 0.0)
-        origin = (distance[:, None] * directions[rows]).astype(np.float32)
-        met = target.embree.run(origin, (-directions[rows]).astype(np.float32)).astype(np.int64)
+        origin = distance[:, None] * directions
+        origin = origin if begin is None else begin + origin
+        met = target.embree.run(origin.astype(np.float32), (-directions).astype(np.float32)).astype(np.int64)
         result[rows[met >= 0]] = target.named[met[met >= 0]]
     return result
 
@@ -211,7 +225,7 @@ def _nearest(
     around, triangle = neighbours.around(which, named.T[which, column])
     tests = intersect(target, pixels, rows[around], triangle, LATTICE)
     ray = pixels.directions()[rows[around]]
-    distance = plane_distance(target, triangle, ray)
+    distance = plane_distance(target, triangle, ray, pixels.from_eye(rows[around]))
     with np.errstate(invalid="ignore"):  # infinity times 0
         reach = distance * reach_along(target.viewer, ray)
     hit = np.flatnonzero((tests.inside >= 0) & (reach >= target.viewer.near) & (reach <= target.viewer.far))
