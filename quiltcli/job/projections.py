@@ -168,8 +168,8 @@ class StProjection(ProjectionBase):
     """Kind of projection."""
     file: Annotated[Path, ExistingFile(MAPS, "an ST map")]
     """EXR or PFM of as many pixels: x in R and y from the bottom in G, 0 to 1; NaN shows nothing."""
-    camera: PlanarCamera = Field(default_factory=PlanarCamera)
-    """The plain picture."""
+    camera: PlanarCamera | None = None
+    """The plain picture; when absent what the file says, as those of quilt export do, else of 60 degrees."""
 
 
 class FisheyeLens(Model):

@@ -6,12 +6,15 @@ pixels that are not there hold NaN. A projection's map has directions from the e
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from quiltcli.charts import Chart
+from quiltcli.charts.shapes import Placed
+from quiltcli.charts.warps import CAMERA_ATTRIBUTE
 from quiltcli.display import Facets
 from quiltcli.errors import LayoutError, Problem
 from quiltcli.formats.exr.image import write_exr
@@ -22,6 +25,7 @@ from quiltcli.job.model import suggest
 
 CELLS = 128
 """Cells from left to right, and from top to bottom, of a mesh that stands for a surface."""
+_MOST_SLOPE = float(np.tan(np.radians(80.0)))
 
 
 def write_display_map(facets: Facets, path: Path, format_name: str | None) -> list[Path]:
@@ -127,7 +131,7 @@ def _write_warp_mesh(facets: Facets, facet: int, path: Path) -> None:
     width, height = chart.size
     columns, rows = min(width, CELLS) + 1, min(height, CELLS) + 1
     s, t = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
-    x, y, z = chart.points(s * width, t * height)
+    x, y, z = _own_directions(chart, s, t)
     with np.errstate(invalid="ignore"):
         radius = np.sqrt(x * x + y * y)
         angle = np.arctan2(radius, -z) / (np.pi / 2)
@@ -142,9 +146,56 @@ def _write_warp_mesh(facets: Facets, facet: int, path: Path) -> None:
     write_text(path, "\n".join(lines) + "\n")
 
 
+def _write_st_map(facets: Facets, facet: int, path: Path) -> None:
+    """An ST map of a projection: where in a plain picture, taken straight ahead, each pixel looks.
+
+    That picture is as wide as what is ahead, up to 80 degrees to each side; its angle and aspect stand in the
+    attribute `quilt:camera`. Pixels that look elsewhere have an alpha of 0.
+
+    Raises:
+        LayoutError: the facet is no projection, or looks nowhere ahead.
+    """
+    chart: Chart | None = facets.charts[facet] if facets.charts else None
+    if chart is None or chart.stands:
+        words = f"facet {facet + 1} is no projection (of a layout an ST map says where its pixels lie)"
+        raise LayoutError(Problem(words, file=facets.path))
+    if path.suffix.lower() != ".exr":
+        raise LayoutError(Problem(f"has the suffix {path.suffix!r} (expected .exr)", file=str(path)))
+    width, height = chart.size
+    s, t = (np.arange(width) + 0.5) / width, ((np.arange(height) + 0.5) / height)[:, None]
+    x, y, z = _own_directions(chart, s, t)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        across, up = x / -z, y / -z
+        shown = (z < 0) & (np.maximum(np.abs(across), np.abs(up)) <= _MOST_SLOPE)
+    if not shown.any():
+        raise LayoutError(Problem(f"facet {facet + 1} looks nowhere ahead", file=facets.path))
+    half = [float(np.abs(slope[shown]).max()) for slope in (across, up)]
+    # A little more, so that its outermost pixels are inside when the numbers have been rounded.
+    fov = round(2 * float(np.degrees(np.arctan(half[1]))) + 0.01, 2)
+    high = float(np.tan(np.radians(fov) / 2))
+    aspect = round(half[0] / high + 0.001, 3)
+    red, green = ((slope / scale + 1) / 2 for slope, scale in ((across, high * aspect), (up, high)))
+    channels = {
+        name: np.where(shown, values, 0.0).astype(np.float32) for name, values in (("R", red), ("G", green))
+    }
+    channels |= {"B": np.zeros_like(channels["R"]), "A": shown.astype(np.float32)}
+    words = "R = x from the left, G = y from the bottom, of a plain picture"
+    camera = json.dumps({"fov_deg": fov, "aspect": aspect})
+    attributes = {"quilt:facet": facet + 1, "quilt:stmap": words, CAMERA_ATTRIBUTE: camera}
+    write_exr(path, channels, attributes)
+
+
+def _own_directions(chart: Chart, s: FloatArray, t: FloatArray) -> FloatArray:
+    """Directions (3, ...) of a projection before it is turned to its heading."""
+    shape = chart.shape.shape if isinstance(chart.shape, Placed) else chart.shape
+    found = shape.at(s, t)
+    return np.broadcast_to(found, (3, *np.broadcast_shapes(np.shape(s), np.shape(t))))
+
+
 FORMATS: dict[str, Callable[[Facets, int, Path], None]] = {
     "xyz": _write_points,
     "obj": _write_mesh,
     "data": _write_warp_mesh,
+    "st": _write_st_map,
 }
 """Forms of a facet by name."""
