@@ -120,6 +120,8 @@ def record_of(spec: Any, display: DisplayFile) -> str:
     """A surface or a projection as JSON that does not depend on where its files lie, only on their bytes."""
     data = {"units": display.metres, **plain(spec, file_sha256)}
     data.pop("place", None)
+    if not data.get("omnistereo", True):
+        del data["omnistereo"]
     matrix = display.world_from_local
     if matrix is not None:
         data["world_from_local"] = matrix.tolist()
