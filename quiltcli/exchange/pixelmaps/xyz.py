@@ -17,10 +17,12 @@ from quiltcli.charts.shapes import Placed
 from quiltcli.charts.warps import CAMERA_ATTRIBUTE
 from quiltcli.display import Facets
 from quiltcli.errors import LayoutError, Problem
+from quiltcli.exchange.pixelmaps.mpcdi3d import write_surfaces
+from quiltcli.exchange.pixelmaps.points import facet_points, points_of
 from quiltcli.formats.exr.image import write_exr
 from quiltcli.formats.pfm import pfm_bytes
 from quiltcli.formats.whole import write_bytes, write_text
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray
+from quiltcli.geometry import FloatArray
 from quiltcli.job.model import suggest
 
 CELLS = 128
@@ -34,19 +36,19 @@ def write_display_map(facets: Facets, path: Path, format_name: str | None) -> li
     Args:
         facets: the display.
         path: the file; NAME_facet_0002.EXT and so on of several facets.
-        format_name: a key of `FORMATS`; by default `obj` or `data` for such a file, else `xyz`.
+        format_name: a key of `FORMATS`; by default `obj`, `data` or `mpcdi` for such a file, else `xyz`.
 
     Raises:
         LayoutError: an unknown format or suffix.
         OutputError: a file cannot be written.
     """
-    name = format_name or {".obj": "obj", ".data": "data"}.get(path.suffix.lower(), "xyz")
+    name = format_name or {".obj": "obj", ".data": "data", ".mpcdi": "mpcdi"}.get(path.suffix.lower(), "xyz")
+    if name == "mpcdi":
+        return write_surfaces(facets, path)
     if name not in FORMATS:
         near = suggest(name, FORMATS)
         hint = f"; did you mean {near}?" if near else ""
-        words = (
-            f"a display has no form {name!r} (known: {', '.join(FORMATS)}{hint}; others belong to layouts)"
-        )
+        words = f"a display has no form {name!r} (known: {', '.join(FORMATS)}, mpcdi{hint}; others belong to layouts)"
         raise LayoutError(Problem(words))
     written = []
     for facet in np.flatnonzero(facets.enabled).tolist():
@@ -67,31 +69,6 @@ def _write_points(facets: Facets, facet: int, path: Path) -> None:
     if path.suffix.lower() != ".exr":
         raise LayoutError(Problem(f"has the suffix {path.suffix!r} (expected .exr or .pfm)", file=str(path)))
     write_exr(path, dict(zip("XYZ", points, strict=True)), {"quilt:facet": facet + 1})
-
-
-def facet_points(facets: Facets, facet: int) -> Float32Array:
-    """Points (3, H, W) under the centres of a facet's pixels, world metres; NaN where it has no pixel."""
-    width, height = facets.size[facet].tolist()
-    x = (np.arange(width) + 0.5)[None, :]
-    result = np.empty((3, height, width), dtype=np.float32)
-    at, mask = points_of(facets, facet)
-    for first in range(0, height, 64):
-        y = (np.arange(first, min(first + 64, height)) + 0.5)[:, None]
-        result[:, first : first + 64] = at(x, y)
-    if mask is not None:
-        result[:, ~mask] = np.nan
-    return result
-
-
-def points_of(
-    facets: Facets, facet: int
-) -> tuple[Callable[[FloatArray, FloatArray], FloatArray], BoolArray | None]:
-    """What gives points (3, ...) of continuous facet pixels, and the facet's mask (H, W)."""
-    chart: Chart | None = facets.charts[facet] if facets.charts else None
-    if chart is not None:
-        return chart.points, chart.mask
-    origin, du, dv = (getattr(facets, name)[facet].reshape(3, 1, 1) for name in ("origin", "du", "dv"))
-    return lambda x, y: origin + du * x + dv * y, None
 
 
 def _write_mesh(facets: Facets, facet: int, path: Path) -> None:
