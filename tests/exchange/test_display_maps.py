@@ -114,7 +114,7 @@ def test_an_st_map_needs_something_ahead(tmp_path: Path) -> None:
 
 def test_a_display_has_no_other_forms(tmp_path: Path) -> None:
     (tmp_path / "d.yaml").write_text("quilt_display: 1\nprojection: {kind: equirect, pixels: [64, 32]}\n")
-    arguments = ["export", str(tmp_path / "d.yaml"), "-o", str(tmp_path / "m.exr"), "--format", "mpcdi"]
+    arguments = ["export", str(tmp_path / "d.yaml"), "-o", str(tmp_path / "m.exr"), "--format", "csv"]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 2
-    assert "a display has no form 'mpcdi'" in result.output
+    assert "a display has no form 'csv'" in result.output

@@ -48,7 +48,8 @@ def write_display_map(facets: Facets, path: Path, format_name: str | None) -> li
     if name not in FORMATS:
         near = suggest(name, FORMATS)
         hint = f"; did you mean {near}?" if near else ""
-        words = f"a display has no form {name!r} (known: {', '.join(FORMATS)}, mpcdi{hint}; others belong to layouts)"
+        known = ", ".join((*FORMATS, "mpcdi"))
+        words = f"a display has no form {name!r} (known: {known}{hint}; others belong to layouts)"
         raise LayoutError(Problem(words))
     written = []
     for facet in np.flatnonzero(facets.enabled).tolist():
