@@ -26,9 +26,9 @@ def export(layout: Path, output: Path, format_name: str | None, display: Path | 
     Textured mesh (.obj), table of panels (.csv), JSON (.json), MPCDI (.mpcdi), ST maps (.exr), or a
     template picture (.png, .svg).
 
-    LAYOUT may be a display file: its pixels' points in the world (.exr, .pfm, .mpcdi), or a mesh whose texture
-    is its image (.obj); of a projection a warp mesh (.data), or an ST map over a plain picture (--format st).
-    But for .mpcdi a file a facet.
+    LAYOUT may be a display file: its pixels' points in the world (.exr, .pfm, .mpcdi), or a mesh whose
+    texture is its image (.obj); of a projection a warp mesh (.data), or an ST map over a plain picture
+    (--format st). But for .mpcdi a file a facet.
     """
     from quiltcli.display import load_display
     from quiltcli.exchange.pixelmaps import known_display, write_display_map, write_map

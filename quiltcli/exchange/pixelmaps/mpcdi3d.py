@@ -7,6 +7,7 @@ places, which are left aside when they are read.
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import zipfile
@@ -196,8 +197,6 @@ def _mask(archive: Archive, region: Region, fileset: ElementTree.Element | None)
     name = _text(alpha, "path")
     if not name or not archive.has(name):
         return None, ""
-    import io
-
     from PIL import Image, UnidentifiedImageError
 
     try:
