@@ -159,11 +159,16 @@ class Facets:
         return digest.hexdigest()
 
 
-def demand_flat(facets: Facets, what: str) -> None:
-    """Raise a DisplayError where a display has curved facets, for something that is for flat ones."""
-    if facets.curved.any():
-        words = f"{what} is for flat facets, and this display has curved ones"
-        raise DisplayError(Problem(f"{words} (quilt facet cuts a surface into flat ones)", facets.path))
+def demand_place(facets: Facets, what: str) -> None:
+    """Raise a DisplayError where a display is a projection, for something that asks where a display is."""
+    if any(chart is not None and not chart.stands for chart in facets.charts):
+        words = f"{what} is for displays that stand in the world, and this projection goes along with the eye"
+        raise DisplayError(Problem(words, facets.path))
+
+
+def eyes_apart(facets: Facets) -> bool:
+    """Whether pixels of a facet have eyes of their own, beside the head."""
+    return any(chart is not None and chart.omni is not None for chart in facets.charts)
 
 
 def display_points(facets: Facets) -> FloatArray:

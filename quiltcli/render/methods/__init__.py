@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from quiltcli.display import eyes_apart
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import Crew
@@ -53,6 +54,8 @@ def draw_frame(
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet, by the job's method; see `frame.draw_frame`."""
     other = OTHERS.get(stage.job.render.method)
+    if other is None and eyes_apart(stage.facets):
+        other = cast_frame
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
     try:
