@@ -193,6 +193,9 @@ class RenderSpec(Model):
     texture_memory: Annotated[float, Field(gt=0, le=1_000_000)] = 4096.0
     """Memory that all textures may take together, megabytes."""
 
+    corrections: bool = True
+    """Make up for what the display file says of its panels (corrections)."""
+
     scale: Annotated[
         Fraction,
         PlainValidator(_scale),

@@ -138,7 +138,7 @@ def _omnistereo_problems(job: JobFile) -> list[Problem]:
             words = f"expected {_shown(allowed)} with omnistereo, which casts a ray a pixel, got {shown}"
             found.append(how.source.problem(key, words))
     if "motion" in job.output.channels:
-        found.append(job.output.source.problem("channels", "motion is told on flat facets alone"))
+        found.append(job.output.source.problem("channels", "motion is not told with omnistereo"))
     return found
 
 
