@@ -115,7 +115,7 @@ def test_a_cone_keeps_the_share_along_the_cylinders() -> None:
 def test_planes_are_off_as_the_elevation_grows(
     viewer: tuple[float, float], rms: float, worst: float, turn: float
 ) -> None:
-    """Pixels between where plane and cone show a point of a ball as wide as the mirror; degrees of viewpoints.
+    """Pixels between where plane and cone show points of a ball as wide as the mirror; viewpoints in degrees.
 
     The figures are those of a prototype that was written apart from this.
     """
