@@ -244,7 +244,7 @@ def test_rays_and_edge_functions_see_the_same(angle: float, cone: bool, curve: C
 
 
 def test_straight_edges_are_wrong_and_less_so_the_finer_they_are() -> None:
-    """Edges bend with the square of their length: of half the length, they are wrong at a quarter of the pixels."""
+    """An edge bends with the square of its length: of half of it, a quarter of the pixels are wrong."""
     size = (512, 512)
     mesh, where = mesh_of(*cube(0.04)), pose(size)
     corners = in_frame(where, mesh.vertices)
