@@ -79,9 +79,7 @@ def render(
     loaded = load_job(job, sets)
     if loaded.ring is not None:
         if facets is not None or scheduler is not None:
-            words = (
-                "a 360° light field display has no facets, and its turns are drawn by one machine's cores"
-            )
+            words = "a 360° light field display has no facets, and its turns are drawn by one machine's cores"
             raise click.UsageError(f"--facets, --scheduler: {words} (--positions draws some of them)")
         from quiltcli.render.ring.walk import RingOptions
 
