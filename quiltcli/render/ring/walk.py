@@ -54,6 +54,7 @@ class RingOptions:
         overwrite: replace files that exist.
         workers: processes; 0 takes every core.
         dry_run: find every problem, write nothing.
+        strict: take what is only worth a second look for a problem.
     """
 
     frames: Sequence[int] | None = None
@@ -63,6 +64,7 @@ class RingOptions:
     overwrite: bool = False
     workers: int = 0
     dry_run: bool = False
+    strict: bool = False
 
 
 def render_turns(
@@ -93,7 +95,10 @@ def render_turns(
     folder = options.folder or job.output.directory
     report = read_report(folder, sha)
     parts = [_part(stage, folder, frame, positions, report, sha, options) for frame in frames]
-    for words in notices(stage):
+    worth_a_word = [*stage.scene.notices, *notices(stage)]
+    if options.strict and worth_a_word:
+        raise JobError([*map(Problem, worth_a_word), Problem("--strict does not allow what is said above")])
+    for words in worth_a_word:
         say(f"note: {words}")
     if options.dry_run:
         return []

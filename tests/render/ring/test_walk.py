@@ -209,6 +209,16 @@ def test_impossible_viewers_are_told(whole: Path, tmp_path: Path, sets: str, wor
     assert not any(tmp_path.iterdir())
 
 
+def test_what_is_worth_a_word_is_refused_where_that_is_wanted(whole: Path, tmp_path: Path) -> None:
+    job, told = load_job(whole.parent / "job.yaml"), []
+    render_turns(job, RingOptions([3], tmp_path / "out", dry_run=True), told.append)
+    assert [words for words in told if "gap" in words]
+    with pytest.raises(JobError, match="--strict does not allow what is said above") as error:
+        render_turns(job, RingOptions([3], tmp_path / "out", strict=True))
+    assert [f"note: {problem.message}" for problem in error.value.problems[:-1]] == told
+    assert not any(tmp_path.iterdir())
+
+
 def test_heads_come_from_a_recorded_path(tmp_path: Path) -> None:
     job = ring_job(tmp_path, frames="1-2")
     heads = tmp_path / "heads.csv"
