@@ -104,7 +104,8 @@ class Placed:
     def at(self, s: FloatArray, t: FloatArray) -> FloatArray:
         """See `Shape.at`."""
         local = self.shape.at(1.0 - s if self.reversed else s, t)
-        return turned(self.linear, local, self.shift)
+        with np.errstate(all="ignore"):  # formulas may give anything; what is not finite is told by who asks
+            return turned(self.linear, local, self.shift)
 
     def normal(self, s: FloatArray, t: FloatArray) -> FloatArray:
         """See `Shape.normal`."""
@@ -112,7 +113,8 @@ class Placed:
         # Normals go with the cofactors of the map of points; the cross product takes its determinant's sign.
         a, b, c = self.linear.T
         cofactors = np.stack((np.cross(b, c), np.cross(c, a), np.cross(a, b)), axis=1)
-        return turned(-cofactors if self.reversed else cofactors, local)
+        with np.errstate(all="ignore"):
+            return turned(-cofactors if self.reversed else cofactors, local)
 
 
 def turned(linear: FloatArray, points: FloatArray, shift: FloatArray | None = None) -> FloatArray:

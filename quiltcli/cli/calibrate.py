@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import OVERWRITE, PATH, POINT
+from quiltcli.cli.options import OVERWRITE, PATH, POINT, refuse_typed
 
 
 @click.command()
@@ -25,7 +25,11 @@ from quiltcli.cli.options import OVERWRITE, PATH, POINT
 @click.option("--units", default="m", show_default=True, help="Unit of measured corners: m, cm, mm, in, ft.")
 @click.option("--report", type=PATH, help="Folder for residuals, pictures and the camera.")
 @click.option(
-    "--tolerance", type=float, default=1.0, show_default=True, help="Clicks: pixels, rms, they may be off."
+    "--tolerance",
+    type=click.FloatRange(min=0),
+    default=1.0,
+    show_default=True,
+    help="Clicks: pixels, rms, they may be off.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Clicks: everything, for programs.")
 @OVERWRITE
@@ -44,6 +48,7 @@ def calibrate(inputs: tuple[Path, ...], display: Path | None, output: Path | Non
     if clicks and (len(inputs) > 1 or display is not None):
         raise click.UsageError("expected one file of clicks, without --display, or photos, or a table")
     if clicks:
+        refuse_typed("beside clicks", but=("inputs", "output", "tolerance", "as_json", "overwrite"))
         _by_clicks(clicks[0], output, **{name: how[name] for name in ("tolerance", "as_json", "overwrite")})
     elif display is None or output is None:
         raise click.UsageError("expected --display and -o beside photos or a table of corners")
@@ -85,6 +90,10 @@ def _by_panels(inputs: tuple[Path, ...], display: Path, output: Path, how: dict[
     tables = [path for path in inputs if path.suffix.lower() == ".csv"]
     if tables and len(inputs) > 1:
         raise click.UsageError("expected photos, or one table of corners, not both")
+    if tables:
+        refuse_typed("beside a table of corners", but=("inputs", "display", "output", "units", "overwrite"))
+    else:
+        refuse_typed("beside photos", ("units", "tolerance", "as_json"))
     lines, texts = (
         _from_corners(spec, facets, tables[0], mesh, how)
         if tables
@@ -107,12 +116,23 @@ def _from_corners(
     spec: Any, facets: Any, path: Path, mesh: str, how: dict[str, Any]
 ) -> tuple[list[str], dict[str, str]]:
     """What to say, and the files' texts."""
-    from quiltcli.calibration.panels.corners import corner_table, fit_corners, read_corners
+    from quiltcli.calibration.panels.corners import (
+        corner_table,
+        doubtful_corners,
+        fit_corners,
+        read_corners,
+        turned_facets,
+    )
+    from quiltcli.errors import JobError, raise_all
     from quiltcli.job import UNITS
 
     if how["units"] not in UNITS:
         raise click.UsageError(f"--units: expected {', '.join(UNITS)}, got {how['units']}")
-    found = fit_corners(spec, facets, read_corners(path, facets, how["units"]), mesh)
+    corners = read_corners(path, facets, how["units"])
+    raise_all(JobError, list(doubtful_corners(path, facets, corners, how["units"]))[:20])
+    for notice in turned_facets(facets, corners):
+        click.echo(f"note: {notice}", err=True)
+    found = fit_corners(spec, facets, corners, mesh)
     return list(corner_table(facets, found.residual)), found.files
 
 
