@@ -32,6 +32,8 @@ IN_GENERAL = {
     "film out -o f.mp4 --size 10x10": "--size: means nothing without --of simulation",
     "film out -o f.mp4 --bits 16": "--bits: means nothing without --codec png or tiff",
     "film out -o f.mp4 --bits 8 --codec dpx": "--bits: means nothing without --codec png or tiff",
+    "project job.yaml --picture a.png -o p --as equirect --tilt-deg 3": "--tilt-deg: means nothing",
+    "project job.yaml --picture a.png -o p --as pinhole --fov-deg 9 --yaw-deg 3": "--yaw-deg: means nothing",
     "pattern turn.yaml -o p --step 3": "--step: means nothing in patterns of a mirror",
     "view ring --ghost 3 --errors": "--errors, --ghost: mean nothing on a page of a spinning mirror",
 }

@@ -105,8 +105,8 @@ def _fill(
     shown = list(pool.map(lambda band: _band(task, *band), list(_bands(stage, view))))
     whole, seen = sum(pixels for pixels, _ in shown), sum(count for _, count in shown)
     dark = 1 - seen / whole if whole else 0.0
-    warnings = (f"the picture does not show {dark:.1%} of the lit facets' pixels",) if dark > 0.0005 else ()
-    return Made(seen, warnings)
+    partly = f"the picture does not show {dark:.1%} of the lit facets' pixels" if dark > 0.0005 else ""
+    return Made(seen, tuple(filter(None, (master.doubt(texels.size), partly))))
 
 
 def _lookup(master: Master, kept: Kept, view: View) -> tuple[Lens, Texels]:
