@@ -100,11 +100,12 @@ def coding_of(path: Path) -> Coding:
     if coding is None:
         wrong = "a film's name must end in .mp4 (H.264) or .mov (ProRes)"
         raise OutputError(Problem(wrong, file=str(path)))
-    _av()
+    load_av()
     return coding
 
 
-def _av() -> Any:
+def load_av() -> Any:
+    """PyAV (MissingExtraError where it is not installed)."""
     try:
         import av
     except ImportError:
@@ -130,7 +131,7 @@ def film(path: Path, fps: Fraction, coding: Coding | None = None) -> Iterator[Ca
         OutputError: the film cannot be written, or its name says of no coding; nothing is left behind.
         MissingExtraError: PyAV is not installed.
     """
-    coding, av = coding or coding_of(path), _av()
+    coding, av = coding or coding_of(path), load_av()
     make_folder(path.parent)
     with whole_file(path) as temporary:
         try:
