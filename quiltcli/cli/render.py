@@ -19,8 +19,11 @@ from quiltcli.cli.printing import print_aligned
 @click.option("--resume", is_flag=True, help="Skip frames that are complete and made by the same job.")
 @OVERWRITE
 @click.option(
-    "--facets", type=FACETS, help="Draw only these facets, such as 3,7-9 or left,right, into existing quilts."
+    "--facets",
+    type=FACETS,
+    help="Draw only these facets, such as 3,7-9 or left,right, into existing quilts, if it has quilts.",
 )
+@click.option("--eye", type=click.Choice(("left", "right")), help="Draw only one eye of two.")
 @click.option(
     "--positions",
     type=POSITIONS,
@@ -53,6 +56,7 @@ def render(
     resume: bool,
     overwrite: bool,
     facets: tuple[int, ...] | str | None,
+    eye: str | None,
     positions: tuple[int, ...] | None,
     threads: int | None,
     scheduler: str | None,
@@ -78,14 +82,14 @@ def render(
         sets = (*sets, f"render.scale={scale}")
     loaded = load_job(job, sets)
     if loaded.ring is not None:
-        if facets is not None or scheduler is not None:
-            raise click.UsageError("--facets and --scheduler are not for 360° light field displays")
+        if facets is not None or eye is not None or scheduler is not None:
+            raise click.UsageError("--facets, --eye and --scheduler are not for 360° light field displays")
         _render_turns(loaded, frames, output, positions, resume, overwrite, threads or 0, dry_run, profile)
         return
     if positions is not None:
         raise click.UsageError("--positions are a 360° light field display's, and this job's has facets")
     ids = _named(loaded, facets) if isinstance(facets, str) else facets
-    options = RenderOptions(frames, output, resume, overwrite, ids, threads or 0, dry_run, strict)
+    options = RenderOptions(frames, output, resume, overwrite, ids, eye, threads or 0, dry_run, strict)
     records = _render(loaded, options, scheduler, progress)
     if profile and records:
         _print_profile(records)

@@ -62,7 +62,8 @@ class RenderOptions:
         folder: output folder instead of the job's.
         resume: skip frames that are complete and made by the same job.
         overwrite: replace images that exist.
-        facets: ids of the only facets to draw, merged into the quilts that exist.
+        facets: ids of the only facets to draw, merged into the quilts that exist, if there are quilts.
+        eye: the only eye to draw, `left` or `right`; None for all.
         threads: batches and files worked on at a time; 0 takes every core.
         dry_run: find every problem, write nothing.
         strict: take what is only worth a second look for a problem.
@@ -73,6 +74,7 @@ class RenderOptions:
     resume: bool = False
     overwrite: bool = False
     facets: Sequence[int] | None = None
+    eye: str | None = None
     threads: int = 0
     dry_run: bool = False
     strict: bool = False
@@ -166,10 +168,10 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
         views_of(job, frames)  # what is wrong with the path is said before anything is loaded
         stage = set_stage(job, options.folder)
         job_sha = job_sha256(job)
-        views = stage.views(frames)
+        views = chosen_views(stage, frames, options.eye)
     only = chosen_facets(stage, options.facets)
     out = outputs(stage, options.folder or job.output.directory, job_sha, options.facets)
-    if only is not None:
+    if only is not None and job.output.quilts:
         raise_all(OutputError, merge_problems(stage, out, views))
     elif options.resume:
         views = unfinished(stage, out, views, options.threads or default_threads())
@@ -209,7 +211,7 @@ def render_frames(
             turns = [(number * most + place) % len(sheets) for place in range(len(group))]
             records, drawn = [], []
             for turn, view in zip(turns, group, strict=True):
-                if ready.only is not None:
+                if ready.only is not None and stage.job.output.quilts:
                     read_quilt(stage, ready.out, view, sheets[turn])
                 now, sheet = moment(stage, view), sheets[turn]
                 records.append(draw_moment(now, sheet, threads, ready.only, dirty=dirty[turn], crew=pool))
@@ -290,6 +292,23 @@ class Writer:
             write_report(out.folder / "report.json", out.job_sha, __version__, records)
             for record in records:
                 self._listener.frame_done(record)
+
+
+def chosen_views(stage: Stage, frames: Sequence[int], eye: str | None) -> list[View]:
+    """The views of frames, or those of an eye.
+
+    Raises:
+        JobError: the job has one eye, or files that both eyes share.
+    """
+    views = stage.views(frames)
+    if eye is None:
+        return views
+    if not stage.job.is_stereo:
+        raise JobError(f"--eye {eye}: the job has one eye (viewer.stereo gives it two)")
+    if stage.job.output.stereo == "parts":
+        words = f"--eye {eye}: both eyes are parts of one file, which is drawn whole"
+        raise JobError(f"{words} (output.stereo: files makes two)")
+    return [view for view in views if view.eye == eye]
 
 
 def chosen_facets(stage: Stage, ids: Sequence[int] | None) -> BoolArray | None:
