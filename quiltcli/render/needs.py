@@ -55,13 +55,16 @@ def _views(job: JobFile, frames: Sequence[int] | None) -> int:
 
 
 def page_warnings(layout: Layout) -> Iterator[str]:
-    """A sentence for pages that few programs take."""
+    """A sentence for pages that few programs take, and for more pixels than displays have."""
     for page, (width, height) in enumerate(layout.pages.tolist(), 1):
-        if max(width, height) > MOST_SIDE or width * height > MOST_PIXELS:
+        if max(width, height) > MOST_SIDE:
             yield (
                 f"page {page} is {width}×{height} pixels: many cards and players take {MOST_SIDE} a side at"
                 " most (layout: size and max_pages make smaller ones)"
             )
+    pixels = int(layout.page_offset[-1])
+    if pixels > MOST_PIXELS:
+        yield f"the pages hold {pixels:,} pixels in all, more than a gigapixel: is the pitch right?"
 
 
 def number_warnings(job: JobFile, frames: Sequence[int] | None = None) -> Iterator[str]:
