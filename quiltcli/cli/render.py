@@ -45,7 +45,12 @@ from quiltcli.cli.printing import print_aligned
 )
 @click.option("--dry-run", is_flag=True, help="Find every problem, write nothing.")
 @click.option("--scale", metavar="SHARE", help="Draw fewer pixels, 1/4 across and down, for a proxy.")
-@click.option("--max-memory", "memory", metavar="SIZE", help="Take at most so much, such as 8GB, or refuse.")
+@click.option(
+    "--max-memory",
+    "memory",
+    metavar="SIZE",
+    help="Take at most so much, such as 8GB: fewer workers, or refuse.",
+)
 @click.option("--strict", is_flag=True, help="Refuse what would only be worth a second look.")
 @click.option("--profile", is_flag=True, help="Say where the time went, by stage.")
 @SETS
@@ -115,7 +120,7 @@ def _render(job: Any, options: Any, scheduler: str | None, form: str) -> Any:
             return render_here(job, options, listener)
         return render_on(scheduler, job, options, listener)
 
-    records = watched(work, form)
+    records = watched(work, form, planned=options.dry_run)
     if options.dry_run:
         click.echo("nothing is wrong with this job")
     elif records:

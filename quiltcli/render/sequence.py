@@ -29,6 +29,7 @@ from quiltcli.job import JobFile, job_sha256
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.interrupt import stop_between_frames
+from quiltcli.render.memory import estimate_text, less_words, shared_out
 from quiltcli.render.methods import draw_moment
 from quiltcli.render.moments import moment
 from quiltcli.render.notices import stage_warnings
@@ -88,11 +89,13 @@ class Listener:
         begin: the number of frames that will be rendered.
         frame_done: the record of a frame whose files are all written.
         say: a sentence for the user.
+        plan: what the run will take of the machine.
     """
 
     begin: Callable[[int], None] = lambda count: None
     frame_done: Callable[[FrameRecord], None] = lambda record: None
     say: Callable[[str], None] = lambda sentence: None
+    plan: Callable[[str], None] = lambda sentence: None
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,12 @@ def render(
     start = time.perf_counter()
     ready = prepare(job, options)
     say_notices(ready, options, listener)
+    threads = options.threads or default_threads()
+    if ready.views:
+        triangles = len(ready.stage.scene.triangles)
+        listener.plan(
+            estimate_text(ready.stage.job, ready.stage.layout, len(ready.views), triangles, threads)
+        )
     if options.dry_run:
         for notice in unseen_in(ready.stage, ready.views):
             listener.say(notice)
@@ -145,7 +154,7 @@ def render(
         return []
     with failing_run(of_the_disk=True):
         write_settings(ready.stage, ready.out)
-    return render_frames(ready, options.threads or default_threads(), listener, start)
+    return render_frames(ready, threads, listener, start)
 
 
 def say_notices(ready: Prepared, options: RenderOptions, listener: Listener) -> None:
@@ -192,10 +201,14 @@ def render_frames(
         start: when the run began, by `time.perf_counter`; None for now.
     """
     stage, views = ready.stage, ready.views
+    share = shared_out(stage.job, stage.layout, views, threads)
+    if words := less_words(share, threads, min(len(views), 2)):
+        listener.say(words)
+    threads = share.workers
     pooled = threads > 1 and can_fork() and worth_forking(stage)
     groups = by_file(views)
     most = max(map(len, groups), default=1)
-    sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in views[:2]]
+    sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in range(share.sheets)]
     # Forked before this process has threads of its own: a lock that one holds would stay locked.
     with ExitStack() as ends:
         ends.enter_context(failing_run())
