@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from quiltcli.errors import counted
-from quiltcli.formats.corners import Faces
+from quiltcli.formats.corners import Faces, normals_of_groups, same_normals
 from quiltcli.formats.usd.changes import Movement, movement
 from quiltcli.formats.usd.mesh import read_dress, read_faces, read_points, subset_rows
 from quiltcli.formats.usd.places import Moment
@@ -193,11 +193,14 @@ class UsdModel:
             return self._points[number]
         piece, form = self.shown.pieces[number], self._form(number, moment)
         points = read_points(self.stage, piece.mesh, moment.time, form.faces.corners.vertices)
+        normals = read_normals(self.stage, piece.mesh, form.faces.corners, moment.time)
+        directions = None if normals is None else normals.at_corners
         if piece.skin is not None:
-            posed = Posed(skinned(piece.prim, piece.skin, moment, points), None)
-        else:
-            normals = read_normals(self.stage, piece.mesh, form.faces.corners, moment.time)
-            posed = Posed(points, None if normals is None else normals.at_corners)
+            points = skinned(piece.prim, piece.skin, moment, points)
+            if normals is not None:
+                # Smooth where the mesh's own are one, and sharp where they differ.
+                directions = normals_of_groups(points, form.faces, same_normals(form.faces, normals))
+        posed = Posed(points, directions)
         if number not in self.movement.points and number not in self.movement.forms:
             self._points[number] = posed
         return posed
