@@ -4,7 +4,8 @@ Embree's rays are single precision: near an edge they may name the neighbour, an
 millionth of their distance apart the farther one. So five rays are cast around every pixel's sample,
 and one from just behind the hit back to the eye. Where all six name one triangle, that is it; for the
 other pixels all triangles that were named, and those that touch them, are met in float64, and the
-nearest is taken. Nothing of binning and rasterization takes part.
+nearest is taken. Nothing of binning and rasterization takes part. Several samples a pixel are cast one after
+another where the rasterizer has them.
 """
 
 from __future__ import annotations
@@ -19,12 +20,15 @@ from quiltcli.display import eyes_apart, lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, cross, dot
 from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
+from quiltcli.render.antialiasing import in_quilt, sample_places
 from quiltcli.render.buffers import Buffers, clear, lay_background
 from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage
+from quiltcli.render.sums import Sums, new_sums, summed
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill
+from quiltcli.shading.shadows import Sample
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Hits
 from quiltcli.visibility.rays.embree import Target, aim, cast, plane_distance, reach_along
@@ -56,6 +60,9 @@ def cast_frame(
     target = target_of(stage, viewer)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     sloped = stage.scene.textures is not None
+    channels, count = stage.job.output.channels, stage.job.render.samples
+    light = summed(channels) if count > 1 else ()
+    data = tuple(name for name in channels if name not in light)
     clear(stage, buffers, only)
     lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers, rays)
 
@@ -64,8 +71,21 @@ def cast_frame(
         pixels = places(address, stage.layout, stage.owners, rays)
         hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals, sloped=sloped)
         if hits.triangle.size:
-            fill(buffers, stage.job.output.channels, gaze, Shaded(stage.scene, viewer.eye, hits))
+            fill(buffers, data, gaze, Shaded(stage.scene, viewer.eye, hits))
+        if light and address.size:
+            add_light(address)
         return hits.inside
+
+    def add_light(address: IntArray) -> None:
+        first, size = int(address[0]), int(address[-1]) - int(address[0]) + 1
+        sums = Sums(new_sums(light, lambda dtype: np.zeros(size, dtype)), light, first)
+        for k, place in enumerate(sample_places(count)):
+            beside = in_quilt(stage.layout, place)
+            pixels = places(address, stage.layout, stage.owners, rays, beside)
+            hits = cast_pixels(target, neighbours, pixels, stage.scene.corner_normals, sloped=sloped)
+            if hits.triangle.size:
+                sums.add(Shaded(stage.scene, viewer.eye, hits, sample=Sample(k, count)))
+        sums.store(buffers, count, stage.scene.background)
 
     with ThreadPoolExecutor(threads) as pool:
         visible = sum(pool.map(draw, pixels_of(stage, rays.lit)))
