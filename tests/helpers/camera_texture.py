@@ -1,4 +1,4 @@
-"""A camera texture: a plain picture that is stirred, as a map of directions and as thousands of flat facets."""
+"""A camera texture: a plain picture that is stirred, as a map of directions and as many flat facets."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FOV = 60.0
 
 
 def swirl(columns: int, rows: int, strength: float = 0.6) -> tuple[FloatArray, FloatArray]:
-    """Offsets (2, rows, columns), right and up in heights of a picture of 4 : 3, that turn its middle around."""
+    """Offsets (rows, columns), right and up in heights of a picture of 4 : 3, that turn its middle."""
     u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
     x, y = (u - 0.5) * 4 / 3, 0.5 - v
     # Nothing moves on the border.
@@ -31,7 +31,7 @@ def as_projection(folder: Path, columns: int, rows: int, pixels: tuple[int, int]
 
 
 def as_facets(folder: Path, columns: int, rows: int, pixels: tuple[int, int], eye: FloatArray) -> str:
-    """The same for one eye, as two flat facets a cell whose texture coordinates are the places they move to."""
+    """The same for one eye, as two flat facets a cell; texture coordinates are the places they move to."""
     # As single precision has them, as in the other file.
     right, up = (part.astype(np.float32).astype(np.float64) for part in swirl(columns, rows))
     width, height = pixels
