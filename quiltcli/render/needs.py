@@ -134,7 +134,6 @@ def _omnistereo_problems(job: JobFile) -> list[Problem]:
         found += [spec.source.problem((), words) for spec in job.people.values()]
     wanted = {
         "method": (how.method, ("homography", "raycast")),
-        "samples": (how.samples, (1,)),
         "shutter": (how.shutter, (0,)),
         "depth_bits": (how.depth_bits, (None,)),
         "backface_culling": (how.backface_culling, (False,)),
@@ -143,7 +142,7 @@ def _omnistereo_problems(job: JobFile) -> list[Problem]:
     for key, (value, allowed) in wanted.items():
         if value not in allowed:
             shown = str(value).lower() if isinstance(value, bool) else value
-            words = f"expected {_shown(allowed)} with omnistereo, which casts a ray a pixel, got {shown}"
+            words = f"expected {_shown(allowed)} with omnistereo, which casts rays, got {shown}"
             found.append(how.source.problem(key, words))
     if "motion" in job.output.channels:
         found.append(job.output.source.problem("channels", "motion is not told with omnistereo"))
