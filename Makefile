@@ -74,7 +74,8 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/transparency.py -o $(DOCS)/transparency.png
 	$(PY) docs/pictures/calibrate.py $(DOCS)/calibrate-residuals.png
 	$(PY) docs/pictures/brightness.py -o $(DOCS)/brightness.png
-	$(PY) docs/pictures/reduce.py $(DOCS)/brightness.png $(DOCS)/calibrate-residuals.png $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png $(DOCS)/show_*.png
+	$(PY) docs/pictures/projectors.py -o $(DOCS)/projectors.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/brightness.png $(DOCS)/projectors.png $(DOCS)/calibrate-residuals.png $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png $(DOCS)/show_*.png
 
 mirror-pictures: env ## make the pictures of docs/lightfield360.md anew
 	$(QUILT) render scenes/demo_mirror.yaml --positions 25-48 --overwrite --set output.tones=true

@@ -9,8 +9,8 @@ from quiltcli.job import load_display_file
 
 WALL = "panels:\n- {name: wall, pixels: [8, 8], size: [4, 3], at: [0, 0, 0]}\n"
 SPHERE = "surfaces:\n- {kind: sphere, radius: 1, pixels: [8, 8]}\n"
-LEFT = "- {name: left, pixels: [96, 64], lens: {at: [-1.6, 0.2, 3], look_at: [-0.7, 0, 0], throw: 1.5}}\n"
-RIGHT = "- {name: right, pixels: [80, 72], lens: {at: [1.5, 0.1, 3.1], look_at: [0.7, 0, 0], throw: 1.5}}\n"
+LEFT = "- {name: left, pixels: [192, 128], lens: {at: [-1.6, 0.2, 3], look_at: [-0.7, 0, 0], throw: 1.5}}\n"
+RIGHT = "- {name: right, pixels: [160, 144], lens: {at: [1.5, 0.1, 3.1], look_at: [0.7, 0, 0], throw: 1.5}}\n"
 
 
 def projected_text(folder: Path, screen: str, projectors: str, more: str = "") -> str:
