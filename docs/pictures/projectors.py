@@ -1,4 +1,4 @@
-"""Write docs/pictures/projectors.png: a projected sphere from the eye without blending and with it, and aside.
+"""Write docs/pictures/projectors.png: a projected sphere without blending and with it, and from aside.
 
 python docs/pictures/projectors.py -o PICTURE.png
 """
