@@ -27,6 +27,7 @@ from quiltcli.scene.lights import (
     Spot,
 )
 from quiltcli.scene.scene import Scene
+from quiltcli.shading.dimmed import let_through
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.rays.blockers import Blockers, blockers_of
 from quiltcli.visibility.resolve.vectors import PointVectors, sum_of_products, vector_values
@@ -81,6 +82,10 @@ class Shadows:
     def blockers(self) -> Blockers:
         """What may be in the way."""
         return blockers_of(self.scene)
+
+    def open(self, places: FloatArray, way: FloatArray | Float32Array, far: float) -> Float32Array:
+        """The share (C,) of light that rays bring; see `dimmed.let_through`."""
+        return let_through(self.scene, self.blockers, places, way.astype(np.float32, copy=False), far)
 
     def _starts(self, rows: IntArray, chosen: IntArray) -> Starts:
         """Where rays from chosen points of some groups (R,) start: above the surface, on the eye's side."""
@@ -156,13 +161,11 @@ class Starts:
 
 
 def _directional(light: Directional, starts: Starts, shadows: Shadows) -> Float32Array:
-    hidden = shadows.blockers.hide(starts.places, -light.direction[:, None], _AFAR)
-    return (~hidden).astype(np.float32)
+    return shadows.open(starts.places, -light.direction[:, None], _AFAR)
 
 
 def _point(light: Point, starts: Starts, shadows: Shadows) -> Float32Array:
-    hidden = shadows.blockers.hide(starts.places, starts.way_to(light.position, shadows), _SHORT_OF)
-    return (~hidden).astype(np.float32)
+    return shadows.open(starts.places, starts.way_to(light.position, shadows), _SHORT_OF)
 
 
 def _area(light: Area, starts: Starts, shadows: Shadows) -> Float32Array:
@@ -183,9 +186,8 @@ def _area(light: Area, starts: Starts, shadows: Shadows) -> Float32Array:
         light_of_it = np.maximum(sum_of_products(starts.normals, way), 0)
         light_of_it *= np.maximum(-sum_of_products(way, shines), 0)
         light_of_it /= np.maximum(length2 * length2, np.float32(1e-12))
-        hidden = shadows.blockers.hide(starts.places, way, _SHORT_OF)
         all_of_it[rows] += light_of_it
-        seen[rows] += np.where(hidden, np.float32(0), light_of_it)
+        seen[rows] += shadows.open(starts.places, way, _SHORT_OF) * light_of_it
     result: Float32Array = np.divide(seen, all_of_it, out=np.ones_like(seen), where=all_of_it > 0)
     return result
 
@@ -201,9 +203,8 @@ def _everywhere(light: Everywhere, starts: Starts, shadows: Shadows) -> Float32A
         if not rows.size:
             continue
         light_of_it = light_of_it[rows] * weight
-        hidden = shadows.blockers.hide(starts.places[:, rows], way[:, None], far)
         all_of_it[rows] += light_of_it
-        seen[rows] += np.where(hidden, np.float32(0), light_of_it)
+        seen[rows] += shadows.open(starts.places[:, rows], way[:, None], far) * light_of_it
     result: Float32Array = np.divide(seen, all_of_it, out=np.ones_like(seen), where=all_of_it > 0)
     return result
 

@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -130,7 +131,7 @@ def _render(
             start = time.perf_counter()
             show = stage.show(part.frame)
             known: Mapping[str, Any] = report.get(part.frame, {}).get("packed", {})
-            sheets = new_sheets(len(part.positions), stage.rig.size)
+            sheets = new_sheets(stage.rig, len(part.positions))
             tones_in = folder if output.tones else None
             record = draw_tones(stage, show, part, sheets, workers, request.check, tones_in, sha)
             record.packed.update(known)
@@ -160,7 +161,7 @@ def _bits(
     start = time.perf_counter()
     make_bits(stage, part, sheets, workers, check)
     inside = np.maximum(np.count_nonzero(sheets.inside, axis=(1, 2)), 1)
-    record.lit = (np.count_nonzero(sheets.bits, axis=(1, 2)) / inside).tolist()
+    record.lit = (np.count_nonzero(sheets.bits, axis=(2, 3)).mean(axis=0) / inside).tolist()
     record.seconds["halftone"] = time.perf_counter() - start
     start = time.perf_counter()
 
@@ -249,8 +250,9 @@ def _part(
     known = report.get(frame, {}).get("packed", {})
     wanted = set(positions)
     problems, finished = [], set()
-    for image in range(images_of(stage)):
-        path = folder / "packed" / packed_name(number_of(stage, number, image))
+    unfinished: set[int] = set()
+    for stream, image in product(stage.rig.streams, range(images_of(stage))):
+        path = folder / "packed" / packed_name(number_of(stage, number, image), stream)
         inside = [position for position in positions_in(stage, image) if position in wanted]
         if not inside or not output.packed:
             continue
@@ -260,6 +262,7 @@ def _part(
         if isinstance(known, dict) and not sound:
             known.pop(path.name, None)
         finished |= have & set(inside)
+        unfinished |= set(inside) - have
         # A picture that has other positions only is added to.
         if (
             path.exists()
@@ -268,6 +271,7 @@ def _part(
             and (not sound or have & set(inside))
         ):
             problems.append(path)
+    finished -= unfinished
     on_disk = set()
     for position in positions if output.tones else ():
         paths = [tones_path(folder, number, position, side) for side in range(len(stage.rig.sides))]
