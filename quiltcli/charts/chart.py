@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from quiltcli.charts.omni import Omnistereo
 from quiltcli.charts.shapes import Shape
 from quiltcli.geometry import BoolArray, FloatArray
 
@@ -27,6 +28,7 @@ class Chart:
         wraps: whether the left and the right edge are the same line of the world.
         cuts: columns, and rows, at which the shape is broken.
         adds: whether its light adds to what other facets show at the same place, as a projector's does.
+        omni: eyes beside the head, for a projection in which each direction has its own; None for one eye.
         record: the surface or the projection in words, JSON, for images and hashes.
     """
 
@@ -38,6 +40,7 @@ class Chart:
     wraps: bool = False
     cuts: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
     adds: bool = False
+    omni: Omnistereo | None = None
     record: str = ""
 
     @property

@@ -13,6 +13,7 @@ from quiltcli.display.curved import joined, projection_facets, surface_facets
 from quiltcli.display.facets import Facets, places_of
 from quiltcli.display.notices import likely_unit
 from quiltcli.display.panels import panel_facets
+from quiltcli.display.points import point_facets
 from quiltcli.display.projectors import projector_facets
 from quiltcli.display.rasters import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
 from quiltcli.display.response import response_of
@@ -47,6 +48,8 @@ def load_display(spec: DisplayFile) -> Facets:
 def _facets(spec: DisplayFile) -> Facets:
     if spec.projection is not None:
         return projection_facets(spec)
+    if spec.points is not None:
+        return point_facets(spec)
     if spec.mesh is None and spec.panels is None:
         return surface_facets(spec)
     flat = panel_facets(spec) if spec.mesh is None else build_facets(read_mesh(spec.mesh), spec)

@@ -40,7 +40,7 @@ def display_info(path: Path) -> Info:
     lines = [
         *_sources(spec),
         ("facets", _facets_text(data)),
-        ("lit side", lit[spec.viewing_side]),
+        ("lit side", "all sides" if spec.points is not None else lit[spec.viewing_side]),
         *_corrections(spec),
         ("area", f"{number(data['area_m2'])} m²"),
         ("pixels", f"{data['pixels']:,}"),
@@ -78,6 +78,8 @@ def _sources(spec: DisplayFile) -> Iterator[tuple[str, str]]:
         yield "mesh", str(spec.mesh)
     if spec.panels is not None:
         yield "panels", f"{len(spec.panels):,}"
+    if spec.points is not None:
+        yield "points", str(spec.points.file)
     if spec.surfaces is not None:
         yield "surfaces", ", ".join(surface.kind for surface in spec.surfaces)
     if spec.projectors is not None:

@@ -94,11 +94,31 @@ def displayed_light(
         triangle: (P,) which of them each ray meets.
     """
     light = np.repeat(_SURROUND[:, None], facet.size, axis=1)
+    met, bright, place = displayed_places(shown, camera, through, facet, skin, triangle)
+    grey = np.abs(dot(shown.facets.normal[facet[met]], normalized(picture_rays(camera, through, met).T)))
+    light[:, met] = (_DARK * (0.25 + 0.75 * grey)).astype(np.float32)
+    light[:, met[bright]] = look_up(shown, facet[met[bright]], place, how)
+    lit = np.zeros(facet.size, dtype=np.bool_)
+    lit[met[bright]] = True
+    return light, lit
+
+
+def displayed_places(
+    shown: Shown,
+    camera: Viewer,
+    through: Camera,
+    facet: Int32Array,
+    skin: Skin | None = None,
+    triangle: Int32Array | None = None,
+) -> tuple[IntArray, BoolArray, FloatArray]:
+    """Where the camera's rays meet images; arguments as of `displayed_light`.
+
+    Returns:
+        (M,) rays that meet a facet; (M,) whether an image is there; (2, B) page pixels of those where one is.
+    """
     facing = lit_facets(shown.facets, camera.eye) & shown.lit
     met = np.flatnonzero(facet >= 0)
     rays = picture_rays(camera, through, met)
-    grey = np.abs(dot(shown.facets.normal[facet[met]], normalized(rays.T)))
-    light[:, met] = (_DARK * (0.25 + 0.75 * grey)).astype(np.float32)
     bright = facing[facet[met]]
     place = quilt_places(shown, facet[met[bright]], rays[:, bright], camera.eye, facing)
     if shown.facets.charts and skin is not None and triangle is not None:
@@ -109,10 +129,7 @@ def displayed_light(
         place[:, bent], shows = curved_pixels(shown, skin, facet[met[on[bent]]], found, camera)
         bright[on[bent[~shows]]] = False
         place = place[:, bright[on]]
-    light[:, met[bright]] = look_up(shown, facet[met[bright]], place, how)
-    lit = np.zeros(facet.size, dtype=np.bool_)
-    lit[met[bright]] = True
-    return light, lit
+    return met, bright, place
 
 
 def seen_from(stage: Stage, shown: Shown, eye: FloatArray, threads: int) -> Shown:

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from quiltcli.display import eyes_apart
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.corrections import Headroom, correct, corrects
@@ -21,6 +22,7 @@ from quiltcli.render.methods.cubemap import draw_cubemap
 from quiltcli.render.methods.raycast import cast_frame
 from quiltcli.render.methods.tessellate import draw_tessellated
 from quiltcli.render.methods.twopass import draw_twice
+from quiltcli.render.methods.unsorted import draw_by_octree, draw_independently
 from quiltcli.render.moments import Moment
 from quiltcli.render.report import Clock, FrameRecord, together
 from quiltcli.render.setup import Stage
@@ -34,8 +36,10 @@ OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], Fram
     "raycast": cast_frame,
     "cubemap": draw_cubemap,
     "tessellate": draw_tessellated,
+    "octree": draw_by_octree,
+    "independent": draw_independently,
 }
-"""Methods that do not rasterize the quilt."""
+"""Methods that do not rasterize the quilt, and those that do without sorting triangles to facets."""
 
 
 def draw_frame(
@@ -51,6 +55,8 @@ def draw_frame(
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet, by the job's method; see `frame.draw_frame`."""
     other = OTHERS.get(stage.job.render.method)
+    if other is None and eyes_apart(stage.facets):
+        other = cast_frame
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
     try:
