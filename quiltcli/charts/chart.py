@@ -27,8 +27,8 @@ class Chart:
         mask: (H, W) pixels that there are; None for all.
         wraps: whether the left and the right edge are the same line of the world.
         cuts: columns, and rows, at which the shape is broken.
-        adds: whether its light adds to what other facets show at the same place, as a projector's does.
         omni: eyes beside the head, for a projection in which each direction has its own; None for one eye.
+        adds: whether its light adds to what other facets show at the same place, as a projector's does.
         record: the surface or the projection in words, JSON, for images and hashes.
     """
 
@@ -39,8 +39,8 @@ class Chart:
     mask: BoolArray | None = None
     wraps: bool = False
     cuts: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
-    adds: bool = False
     omni: Omnistereo | None = None
+    adds: bool = False
     record: str = ""
 
     @property

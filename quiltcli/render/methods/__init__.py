@@ -64,7 +64,7 @@ def draw_frame(
             stage, viewer, buffers, threads, only, dirty=dirty, crew=crew, exposures=exposures
         )
     except TooNearError:
-        if stage.job.render.samples > 1 or exposures is not None:
+        if exposures is not None:
             raise
         if dirty is not None:
             dirty[:] = True
