@@ -207,8 +207,11 @@ class PanelSpec(Model):
         return step * self.pixels[0], step * self.pixels[1]
 
 
+_NOT_PROJECTED = ("mesh", "panels", "surfaces", "points", "projection", "resolution", "transform", "layout")
+
+
 class DisplayFile(FileModel):
-    """A display: the faces of a mesh, panels, curved surfaces, or a projection about the eye."""
+    """A display: the faces of a mesh, panels, curved surfaces, projectors, or a projection about the eye."""
 
     kind: ClassVar[str] = "quilt_display"
 
@@ -309,7 +312,7 @@ class DisplayFile(FileModel):
                 if getattr(self, name) is not None:
                     yield (name,), "belongs to projectors (expected projectors: a list of them)"
             return
-        for name in ("mesh", "panels", "surfaces", "projection", "resolution", "transform", "layout"):
+        for name in _NOT_PROJECTED:
             if getattr(self, name) is not None:
                 yield (name,), "cannot stand beside projectors (the screen's file says where it stands)"
         if self.facets:
