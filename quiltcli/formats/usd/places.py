@@ -85,7 +85,8 @@ class Moment:
         if len(outer) * len(own) > MOST_COPIES:
             words = f"shows {len(outer) * len(own):,} instances of {within.root.GetName()!r}"
             raise self.stage.error(within.prim, f"{words} (expected at most {MOST_COPIES:,})")
-        result: FloatArray = (outer[:, None] @ (own @ local)[None]).reshape(-1, 4, 4)
+        with np.errstate(over="ignore", invalid="ignore"):
+            result: FloatArray = (outer[:, None] @ (own @ local)[None]).reshape(-1, 4, 4)
         return result
 
     def instances(self, within: Instancer) -> FloatArray:

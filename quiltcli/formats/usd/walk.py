@@ -34,6 +34,7 @@ class Piece:
         subsets: those of its faces that have materials of their own, and rows of `materials`.
         skin: what moves its points, or None.
         mesh: its schema, `pxr.UsdGeom.Mesh`; that of another stage for a shape by formula.
+        shelf: that stage, which lives as long as somebody holds it.
     """
 
     prim: Any
@@ -42,6 +43,7 @@ class Piece:
     subsets: tuple[tuple[Any, int], ...]
     skin: Skin | None
     mesh: Any
+    shelf: Any
 
     def asked(self, uv_names: tuple[str, ...]) -> Asked:
         """The primvars that its materials look up, of texture coordinates the first two of these."""
@@ -61,13 +63,11 @@ class Shown:
         pieces: its meshes.
         lights: prims of its lights.
         notices: what is left out.
-        shelf: the stage that holds the meshes of shapes.
     """
 
     pieces: tuple[Piece, ...]
     lights: tuple[Any, ...]
     notices: tuple[str, ...]
-    shelf: Any
 
 
 @dataclass(eq=False)
@@ -123,10 +123,11 @@ class _Walk:
                 one.subsets,
                 skins.get(path_of(one.prim)),
                 one.mesh,
+                self.shelf,
             )
             for one in self.found.values()
         )
-        return Shown(pieces, tuple(self.lights), tuple(self._notices()), self.shelf)
+        return Shown(pieces, tuple(self.lights), tuple(self._notices()))
 
     def _take(self, top: Any, within: Instancer | None, depth: int) -> None:
         """All that is shown below a prim, itself included."""

@@ -159,7 +159,8 @@ class UsdModel:
         """Metres, Y up, from the space of a mesh (C, 4, 4), for all its copies that are seen."""
         seen = [place for place in piece.places if everything or moment.shown(place)]
         found = [moment.matrices(place) for place in seen]
-        return np.asarray(self.stage.world @ np.concatenate([np.empty((0, 4, 4)), *found]))
+        with np.errstate(over="ignore", invalid="ignore"):  # bake drops what is nowhere
+            return np.asarray(self.stage.world @ np.concatenate([np.empty((0, 4, 4)), *found]))
 
     def _check_size(self, moment: Moment, everything: bool) -> None:
         """Count before anything is copied: a small file can ask for very much."""

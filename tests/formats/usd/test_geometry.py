@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from quiltcli.errors import MeshError, MissingExtraError
+from quiltcli.formats.mesh import read_mesh
+from quiltcli.scene import load_scene
 from tests.helpers.usd_files import (
+    bound,
     corners,
+    material,
     mesh,
     moved,
     needs_usd,
@@ -351,6 +355,30 @@ def test_planes_face_along_their_axis(tmp_path, axis, normal):
     inputs = f'double width = 2\ndouble length = 3\nuniform token axis = "{axis}"'
     path = stage(tmp_path / "a.usda", f'def Plane "p"\n{{\n{inputs}\n}}\n')
     np.testing.assert_allclose(area(corners(path)), np.multiply(normal, 6))
+
+
+def test_a_sphere_may_be_a_display(tmp_path):
+    found = read_mesh(stage(tmp_path / "a.usda", 'def Sphere "s"\n{\n}\n'))
+    assert found.count == 96 * 48
+
+
+@pytest.mark.parametrize("far", ["nan", "inf", "1e300"])
+def test_what_is_nowhere_is_dropped_from_scenes_and_refused_as_a_display(tmp_path, far):
+    ops = f"double3 xformOp:translate = ({far}, 0, 0)\nfloat3 xformOp:scale = (1, 1, 1)"
+    order = '"xformOp:translate", "xformOp:scale"'
+    path = stage(tmp_path / "a.usda", mesh("here"), xform("x", mesh("gone"), ops=ops, order=order))
+    scene = load_scene(path)
+    assert len(scene.triangles) == 2
+    assert "a: 2 triangles with NaN or infinite vertices dropped" in scene.notices
+    with pytest.raises(MeshError, match=r"vertex 5 is \("):
+        read_mesh(path)
+
+
+def test_names_that_are_no_text_are_an_error(tmp_path):
+    path = stage(tmp_path / "a.usda", mesh(**bound("m")), material("m", "token inputs:x = 'é'"))
+    path.write_bytes(path.read_bytes().replace("é".encode(), b"\xe1("))
+    with pytest.raises(MeshError, match="UTF-8"):
+        parts_of(path)
 
 
 def test_shapes_have_their_colours_and_those_above(tmp_path):
