@@ -46,6 +46,8 @@ def job_sha256(job: JobFile) -> str:
         del data["render"]["scale"]  # what there was before there was this key
     else:
         data["layout"] = "packed anew"
+    if job.render.corrections:
+        del data["render"]["corrections"]  # likewise
     del data["frames"], data["render"]["texture_memory"]
     data["output"] = {key: data["output"][key] for key in ("channels", "compression", "data_window")}
     return _text_sha256(data)

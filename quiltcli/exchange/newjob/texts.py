@@ -6,8 +6,9 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from quiltcli.exchange.newjob.kinds import Ball, Wishes, kind_of
+from quiltcli.exchange.newjob.kinds import kind_of
 from quiltcli.exchange.newjob.stand import Stand
+from quiltcli.exchange.newjob.wishes import Ball, Wishes
 from quiltcli.job.display import DisplayFile, PanelSpec
 
 # A regular icosahedron of radius 1, to have something to see.
