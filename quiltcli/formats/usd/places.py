@@ -89,6 +89,11 @@ class Moment:
             result: FloatArray = (outer[:, None] @ (own @ local)[None]).reshape(-1, 4, 4)
         return result
 
+    def count(self, place: Place) -> int:
+        """How many copies there are in a place, seen or not."""
+        within = place.within
+        return 1 if within is None else self.count(within.place) * len(self.instances(within))
+
     def instances(self, within: Instancer) -> FloatArray:
         """Instancer from prototype (I, 4, 4) of the instances of one prototype that are not masked."""
         key = path_of(within.prim), within.row

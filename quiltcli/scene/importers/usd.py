@@ -95,8 +95,13 @@ class UsdModel:
             moment = self._moment(seconds, playing)
             everything = self._all_hidden(moment)
             return tuple(
-                (len(self._places(moment, self.shown.pieces[number], everything)), self._key(number, moment))
-                + tuple(moment.shown(place) for place in self.shown.pieces[number].places)
+                (
+                    self._form(number, moment).faces.key,
+                    *(
+                        moment.count(place) if everything or moment.shown(place) else 0
+                        for place in self.shown.pieces[number].places
+                    ),
+                )
                 for number in sorted(self.movement.forms)
             )
 
@@ -171,13 +176,10 @@ class UsdModel:
                 words = f"and all before it show {total:,} triangles (expected at most {MOST_TRIANGLES:,})"
                 raise self.stage.error(piece.prim, words)
 
-    def _key(self, number: int, moment: Moment) -> bytes:
-        return read_faces(self.stage, self.shown.pieces[number].mesh, moment.time).key
-
     def _form(self, number: int, moment: Moment) -> Form:
         """A mesh's triangles at a time; the last ones are kept."""
         kept = self._forms.setdefault(number, {})
-        if kept and number not in self.movement.forms:
+        if kept and number not in self.movement.faces:
             return next(iter(kept.values()))
         piece = self.shown.pieces[number]
         faces = read_faces(self.stage, piece.mesh, moment.time)
@@ -208,7 +210,7 @@ class UsdModel:
                 # Smooth where the mesh's own are one, and sharp where they differ.
                 directions = normals_of_groups(points, form.faces, same_normals(form.faces, normals))
         posed = Posed(points, directions)
-        if number not in self.movement.points and number not in self.movement.forms:
+        if number not in self.movement.points:
             self._points[number] = posed
         return posed
 
