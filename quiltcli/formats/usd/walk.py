@@ -231,7 +231,8 @@ class _Walk:
         for words, count in sorted(self.left.items()):
             yield f"{counted(count, words)} left out"
         if self.foreign_schemes:
-            yield f"subdivided by another scheme than {SUBDIVIDED}, drawn as cages: {listed(self.foreign_schemes)}"
+            which = listed(self.foreign_schemes)
+            yield f"subdivided by another scheme than {SUBDIVIDED}, drawn as cages: {which}"
         if self.foreign:
             yield f"no UsdPreviewSurface, drawn by displayColor: {listed(self.foreign)}"
         lost: dict[str, list[str]] = {}
