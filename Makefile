@@ -72,6 +72,7 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/channels.py out/demo/facets/facet_0001.0003.exr -o $(DOCS)/channels.png
 	$(PY) docs/pictures/motion_blur.py -o $(DOCS)/motion-blur.png
 	$(PY) docs/pictures/transparency.py -o $(DOCS)/transparency.png
+	$(PY) docs/pictures/usd.py -o $(DOCS)/usd.png && $(PY) docs/pictures/reduce.py $(DOCS)/usd.png
 	$(PY) docs/pictures/calibrate.py $(DOCS)/calibrate-residuals.png
 	$(QUILT) simulate scenes/demo.yaml -f 4 -o $(DOCS)/triptych.png --triptych --size 480x380 --supersample 3
 	$(PY) docs/pictures/brightness.py -o $(DOCS)/brightness.png
