@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainValidator, WithJsonSchema
 
 from quiltcli import geometry
+from quiltcli.job.corrections import CorrectionsSpec
 from quiltcli.job.layout import UvLayoutSpec
 from quiltcli.job.lengths import UNITS, Coordinate, Length, UpAxis, exact_metres, read_length, up_matrix
 from quiltcli.job.model import (
@@ -232,6 +233,8 @@ class DisplayFile(FileModel):
     """What is different on single facets, by facet id."""
     transform: TransformSpec | None = None
     """Place of the display in the world."""
+    corrections: CorrectionsSpec | None = None
+    """What the panels make of their images, which the images make up for."""
     layout: UvLayoutSpec | None = None
     """Take the layout from the texture coordinates of the mesh."""
 

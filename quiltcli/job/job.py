@@ -153,6 +153,8 @@ class RenderSpec(Model):
 
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1
     """Samples a pixel; 1 is exactly the pixel's centre."""
+    sample_shading: bool = False
+    """Work light out at every sample of a pixel, not once for a triangle and pixel where it is smooth."""
     shutter: Unit = 0.0
     """How long the shutter is open from the frame's time on, as a share of a frame: motion blur."""
     motion_samples: Annotated[int, Field(ge=1, le=MOST_TIMES)] = 16
@@ -190,6 +192,9 @@ class RenderSpec(Model):
     """Largest side of a texture, pixels; larger pictures are reduced."""
     texture_memory: Annotated[float, Field(gt=0, le=1_000_000)] = 4096.0
     """Memory that all textures may take together, megabytes."""
+
+    corrections: bool = True
+    """Make up for what the display file says of its panels (corrections)."""
 
     scale: Annotated[
         Fraction,
@@ -358,6 +363,8 @@ class JobFile(FileModel):
             if method in ("exact", "vertex"):
                 yield ("render", "method"), f"expected {either(METHODS)} beside viewer, got {method}"
             return
+        if self.halftone is not None and self.halftone.before and self.lightfield is None:
+            yield ("halftone", "before"), "is for photographs (expected `lightfield` and no scene beside it)"
         if "method" in self.render.model_fields_set and method not in RING_METHODS:
             yield ("render", "method"), f"expected {either(RING_METHODS)} beside ring, got {method}"
         if self.layout is not None:
@@ -400,7 +407,7 @@ class JobFile(FileModel):
     layout: LayoutChoice | None = None
     """Layout file, or how to pack; the display's own layout or the packing defaults when absent."""
     scene: ScenePath
-    """Scene file, or a mesh or glTF file."""
+    """Scene file, or a mesh, glTF or USD file."""
     lightfield: YamlPath | None = None
     """Light field file, photographs for a 360° light field display to show, instead of `scene`."""
     frames: FrameRange

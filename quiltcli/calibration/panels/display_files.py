@@ -51,6 +51,8 @@ def moved_display(
         for k, panel in enumerate(spec.panels)
     ]
     data: dict[str, Any] = {"quilt_display": 1, "panels": panels, "viewing_side": spec.viewing_side}
+    if spec.corrections is not None:
+        data["corrections"] = plain(spec.corrections, str)
     return {"": _HEAD + dump_yaml(data)}
 
 
@@ -90,6 +92,8 @@ def mesh_display(
         if scale != 1 and spec.resolution.density is not None:
             data["resolution"] = {"pixels_per_metre": spec.resolution.density / scale}
     data["facets"] = each
+    if spec.corrections is not None:
+        data["corrections"] = plain(spec.corrections, str)
     if spec.layout is not None:
         data["layout"] = plain(spec.layout, str)
     return {"": _HEAD + dump_yaml(data), mesh: "\n".join(lines) + "\n"}

@@ -29,6 +29,7 @@ class Places:
         x: (P,) column.
         y: (P,) row.
         ray: (P, 3, 3) page pixel (x, y, 1) → direction from the eye; on a curved facet each pixel's own.
+        origin: (P, 3) where rays begin, minus the eye, metres; None where all begin there.
     """
 
     address: IntArray
@@ -38,12 +39,34 @@ class Places:
     x: IntArray
     y: IntArray
     ray: FloatArray
+    origin: FloatArray | None = None
+
+    def from_eye(self, row: IntArray) -> FloatArray | None:
+        """Where rays of some pixels begin (N, 3), minus the eye; None where all begin there."""
+        return None if self.origin is None else self.origin[row]
+
+    def take(self, rows: IntArray) -> Places:
+        """Some of the pixels."""
+        return Places(
+            address=self.address[rows],
+            facet=self.facet[rows],
+            bleed=self.bleed[rows],
+            page=self.page[rows],
+            x=self.x[rows],
+            y=self.y[rows],
+            ray=self.ray[rows],
+            origin=self.from_eye(rows),
+        )
 
     def directions(self, dx: float = 0.0, dy: float = 0.0) -> FloatArray:
         """Unit directions (P, 3) through the pixels, `dx`, `dy` pixels beside their centres."""
+        return normalized(self.rays(dx, dy))
+
+    def rays(self, dx: float = 0.0, dy: float = 0.0) -> FloatArray:
+        """The same of the length that `ray` gives them."""
         x, y = self.x + (0.5 + dx), self.y + (0.5 + dy)
         ray = self.ray
-        return normalized(ray[:, :, 0] * x[:, None] + ray[:, :, 1] * y[:, None] + ray[:, :, 2])
+        return np.asarray(ray[:, :, 0] * x[:, None] + ray[:, :, 1] * y[:, None] + ray[:, :, 2])
 
 
 def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> Places:
@@ -55,12 +78,17 @@ def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRay
     local = address - layout.page_offset[page]
     x, y = local % width, local // width
     ray = rays.eye_from_quilt[facet]
+    origin: FloatArray | None = None
     for row, view in enumerate(rays.views):
         if view is not None:
             mine = np.flatnonzero(facet == row)
             if mine.size:
                 ray[mine] = view.matrices(x[mine] + 0.5, y[mine] + 0.5)
-    return Places(address, facet, owner < 0, page, x, y, ray)
+                begin = view.origins(x[mine] + 0.5, y[mine] + 0.5)
+                if begin is not None:
+                    origin = np.zeros((address.size, 3)) if origin is None else origin
+                    origin[mine] = begin.T
+    return Places(address, facet, owner < 0, page, x, y, ray, origin)
 
 
 def lit_pixels(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> BoolArray:

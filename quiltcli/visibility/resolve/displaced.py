@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, IntArray
+from quiltcli.geometry import IntArray
 from quiltcli.visibility.resolve.hits import Hits
 from quiltcli.visibility.resolve.pixels import MixedTiles, Rays, pixel_hits
 from quiltcli.visibility.resolve.reader import Reader
-from quiltcli.visibility.resolve.tiles import in_parts, owned_pixels, tiles_at
+from quiltcli.visibility.resolve.tiles import Tiles, in_parts, owned_pixels, tiles_at
 from quiltcli.visibility.setup.samples import Samples
 
 _AT_ONCE = 1024  # microtiles
@@ -32,21 +32,25 @@ class DisplacedTiles(MixedTiles):
         keys = self.reader.canvas.keys.take(self.tiles.index, axis=0)
         pixel, places, inside = owned_pixels(self.reader.blocks, self.tiles, keys != 0)
         keys = keys.reshape(-1).take(pixel)
-        x, y = (self.samples.place[k].take(self.tiles.index, axis=0).reshape(-1).take(pixel) for k in (0, 1))
-        rays = _rays(self.reader, self.tiles.block.take(pixel >> 6), x, y)
+        rays = rays_of(self.reader, self.samples, self.tiles, pixel)
         return pixel_hits(self.reader, self.tiles, keys, pixel, places, inside, rays)
 
 
-def _rays(reader: Reader, block: IntArray, x: FloatArray, y: FloatArray) -> Rays:
-    """Rays of pixels (G,) of blocks (G,) that go through at columns x and rows y."""
+def rays_of(reader: Reader, samples: Samples, tiles: Tiles, pixel: IntArray) -> Rays:
+    """Rays of pixels (G,) of microtiles of patches, counted through all of these."""
     limits = reader.limits
-    vectors = np.stack(limits.directions(block.astype(np.int32), x, y))
+    # All pixels of microtiles, for a matrix each is less to move than one a pixel.
+    x, y = (samples.place[k].take(tiles.index, axis=0) for k in (0, 1))
+    directions = limits.directions(tiles.block.astype(np.int32)[:, None], x, y)
+    vectors = np.empty((3, pixel.size))
+    for k in range(3):
+        directions[k].reshape(-1).take(pixel, out=vectors[k])
     if limits.radial:
         depth = np.sqrt(vectors[0] * vectors[0] + vectors[1] * vectors[1] + vectors[2] * vectors[2])
     else:
         look = limits.look
         depth = look[0] * vectors[0] + look[1] * vectors[1] + look[2] * vectors[2]
-    return Rays(x, y, vectors, depth)
+    return Rays(x.reshape(-1).take(pixel), y.reshape(-1).take(pixel), vectors, depth)
 
 
 def read_displaced(reader: Reader, samples: Samples) -> Iterator[DisplacedTiles]:
