@@ -11,6 +11,7 @@ import numpy as np
 
 from quiltcli.charts.chart import EDGE_ON, Chart
 from quiltcli.display.edges import SharedEdges, find_shared_edges
+from quiltcli.display.response import Response
 from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import polygons
 from quiltcli.formats.yaml.source import Source
@@ -44,6 +45,7 @@ class Places:
         corner: (n, 2) pixel x, y of the page.
         source: finds lines in the display file.
         keys: where in the file each facet's own entry stands.
+        page_size: width and height of the pages that the places are on; None where the file does not say.
     """
 
     facet: Int32Array
@@ -53,6 +55,7 @@ class Places:
     corner: Int32Array
     source: Source
     keys: Mapping[int, tuple[str | int, ...]]
+    page_size: tuple[int, int] | None = None
 
     def problem(self, key: Sequence[str | int], message: str) -> Problem:
         """A problem with the place of a facet: the key begins with `facets` and its id."""
@@ -106,6 +109,7 @@ class Facets:
         places: facets whose place in the quilt the display file gives; None when it gives none.
         charts: of F facets those of curved ones, None for flat ones; empty where all are flat. A curved
             facet's corners, origin and steps are those of a rectangle that stands for it.
+        response: what the panels make of their images; None where they show them as they are.
     """
 
     names: tuple[str, ...]
@@ -123,6 +127,7 @@ class Facets:
     path: str
     places: Places | None = None
     charts: tuple[Chart | None, ...] = ()
+    response: Response | None = None
 
     @property
     def curved(self) -> BoolArray:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from quiltcli.charts.chart import Chart
+from quiltcli.charts.meet import meet
 from quiltcli.charts.shapes import turned
-from quiltcli.geometry import BoolArray, FloatArray
+from quiltcli.geometry import BoolArray, FloatArray, IntArray
 from quiltcli.layout import Layout
 
 NEAR = 0.05
@@ -25,6 +26,7 @@ class ChartView:
         eye: (3,) world metres.
         turn: (3, 3) world from the viewer's own axes, for a projection; None where it is not turned.
         facet_from_quilt: (2, 3) page pixels to facet pixels.
+        page: quilt address of its page's first pixel, and the page's width.
         head: (3,) place of the head minus the eye, where each pixel's eye is somewhere beside it; else None.
         half: half the distance between such eyes, metres; negative for left ones.
     """
@@ -33,6 +35,7 @@ class ChartView:
     eye: FloatArray
     turn: FloatArray | None
     facet_from_quilt: FloatArray
+    page: tuple[int, int] = (0, 1)
     head: FloatArray | None = None
     half: float = 0.0
 
@@ -49,6 +52,26 @@ class ChartView:
         if not self.chart.stands:
             return points if self.turn is None else turned(self.turn, points)
         return points - self.eye.reshape(3, *[1] * (points.ndim - 1))
+
+    def moved(self, address: IntArray, rays: FloatArray) -> FloatArray:
+        """How far right and down (2, P), in page pixels, rays go through beside some pixels' centres.
+
+        Args:
+            address: (P,) quilt addresses of the pixels.
+            rays: (3, P) from the eye, of any length.
+
+        Returns:
+            0 where a ray meets the chart nowhere near.
+        """
+        y, x = np.divmod(address - self.page[0], self.page[1])
+        place = np.stack(self.facet_pixels(x + 0.5, y + 0.5))
+        origin = self.eye
+        if not self.chart.stands:
+            origin = np.zeros(3)
+            rays = rays if self.turn is None else turned(self.turn.T, rays)
+        across, down = meet(self.chart, origin, rays, place) - place
+        (a, b, _), (c, d, _) = self.facet_from_quilt
+        return np.asarray(np.stack((d * across - b * down, a * down - c * across)) / (a * d - b * c))
 
     def origins(self, x: FloatArray, y: FloatArray) -> FloatArray | None:
         """Where rays of page pixels begin (3, ...), minus the eye; None where all begin there."""
@@ -103,7 +126,9 @@ def chart_views(
             views.append(None)
             continue
         turn = camera_from_world.T if chart.follows == "view" else None
-        view = ChartView(chart, eye, turn, inverse_affine(layout.quilt_from_facet[row]))
+        page = max(int(layout.page[row]), 0)
+        where = int(layout.page_offset[page]), int(layout.pages[page, 0])
+        view = ChartView(chart, eye, turn, inverse_affine(layout.quilt_from_facet[row]), where)
         if chart.omni is not None and head is not None:
             view = replace(view, head=head - eye, half=beside)
         views.append(view)

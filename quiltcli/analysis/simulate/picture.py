@@ -15,6 +15,7 @@ from quiltcli.job import JobFile
 from quiltcli.layout import Layout
 from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.buffers import Buffers, new_buffers
+from quiltcli.render.corrections import on_panels
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.methods import draw_frame as draw_by_method
 from quiltcli.render.setup import Stage, stage_of
@@ -130,6 +131,22 @@ def displayed_places(
         bright[on[bent[~shows]]] = False
         place = place[:, bright[on]]
     return met, bright, place
+
+
+def seen_from(stage: Stage, shown: Shown, eye: FloatArray, threads: int) -> Shown:
+    """The images as panels of a known response show them to an eye (3,); the same for perfect panels."""
+    response = shown.facets.response
+    if response is None:
+        return shown
+
+    def change(row: int, image: FloatArray, cosine: FloatArray, _: object) -> tuple[FloatArray, None]:
+        return response.shown(row, image, cosine), None
+
+    buffers = {name: shown.buffers[name].astype(np.float32) for name in "RGB"}
+    rows = np.flatnonzero(shown.lit).tolist()
+    leaks = response.blend is not None and response.blend.black > 0
+    on_panels(stage, shown.owners, rows, buffers, eye, change, threads, black=leaks)
+    return replace(shown, buffers=buffers)
 
 
 def curved_pixels(

@@ -16,7 +16,9 @@ from quiltcli.analysis.verify.tolerances import depth_tolerance
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, OwnerArray
 from quiltcli.layout import Layout
 from quiltcli.projection.planar import QuiltRays
-from quiltcli.visibility.rays.embree import MISS, Target, cast, plane_depth, plane_distance
+from quiltcli.scene import Scene
+from quiltcli.shading.along import cast_on, presence
+from quiltcli.visibility.rays.embree import MISS, Target, plane_depth, plane_distance
 from quiltcli.visibility.rays.exact import Neighbours
 from quiltcli.visibility.rays.pixels import OFFSETS, Places, places
 
@@ -34,6 +36,7 @@ class Trial:
         target: the scene from the eye.
         neighbours: which of its triangles touch.
         images: what is verified.
+        scene: the scene.
     """
 
     layout: Layout
@@ -42,6 +45,11 @@ class Trial:
     target: Target
     neighbours: Neighbours
     images: Images
+    scene: Scene
+
+    def presence(self, pixels: Places, row: IntArray, triangle: IntArray) -> NDArray[np.uint8]:
+        """Whether triangles (M,) are there at the centres of pixels `row` (M,); see `along.presence`."""
+        return presence(self.scene, self.target, pixels.take(row), triangle)
 
 
 @dataclass(frozen=True)
@@ -113,8 +121,7 @@ class Sighting:
 def sight(trial: Trial, address: IntArray) -> Sighting:
     """Cast the five rays of the pixels at `address` (P,), and look at the images there."""
     pixels = places(address, trial.layout, trial.owners, trial.rays)
-    begin = pixels.origin
-    named = np.stack([cast(trial.target, pixels.directions(*way), origin=begin) for way in OFFSETS])
+    named = np.stack([cast_on(trial.scene, trial.target, pixels, offset) for offset in OFFSETS])
     centre = pixels.directions()
     plane = np.full(named.shape, np.inf)
     for k, row in enumerate(named):
@@ -170,10 +177,10 @@ def _faults(trial: Trial, seen: Sighting) -> tuple[Kinds, IntArray, IntArray]:
         some = seen.take(rows)
         centre = some.pixels.directions()
         start = np.where(some.named[0] >= 0, _distance(trial.target, some, centre), 0.0)
-        behind = cast(trial.target, centre, start * (1 + 1e-6), some.pixels.origin)
+        behind = cast_on(trial.scene, trial.target, some.pixels, beyond=start * (1 + 1e-6))
         named = np.concatenate((some.named, behind[None]))
         verdict[rows], shown[rows] = judge(
-            trial.target, trial.neighbours, some.pixels, named, some.drawn, some.z
+            trial.target, trial.neighbours, some.pixels, named, some.drawn, some.z, trial.presence
         )
     return kind, verdict, shown
 

@@ -61,9 +61,13 @@ class Places:
 
     def directions(self, dx: float = 0.0, dy: float = 0.0) -> FloatArray:
         """Unit directions (P, 3) through the pixels, `dx`, `dy` pixels beside their centres."""
+        return normalized(self.rays(dx, dy))
+
+    def rays(self, dx: float = 0.0, dy: float = 0.0) -> FloatArray:
+        """The same of the length that `ray` gives them."""
         x, y = self.x + (0.5 + dx), self.y + (0.5 + dy)
         ray = self.ray
-        return normalized(ray[:, :, 0] * x[:, None] + ray[:, :, 1] * y[:, None] + ray[:, :, 2])
+        return np.asarray(ray[:, :, 0] * x[:, None] + ray[:, :, 1] * y[:, None] + ray[:, :, 2])
 
 
 def places(

@@ -11,7 +11,7 @@ from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.visibility.resolve.hits import Hits
 from quiltcli.visibility.resolve.pixels import MixedTiles, Rays, pixel_hits
 from quiltcli.visibility.resolve.reader import Reader
-from quiltcli.visibility.resolve.tiles import in_parts, owned_pixels, tiles_at
+from quiltcli.visibility.resolve.tiles import Tiles, in_parts, owned_pixels, tiles_at
 from quiltcli.visibility.setup.samples import Samples
 
 _AT_ONCE = 1024  # microtiles
@@ -33,16 +33,24 @@ class DisplacedTiles(MixedTiles):
         keys = self.reader.canvas.keys.take(self.tiles.index, axis=0)
         pixel, places, inside = owned_pixels(self.reader.blocks, self.tiles, keys != 0)
         keys = keys.reshape(-1)
-        x, y = (self.samples.place[k].take(self.tiles.index, axis=0) for k in (0, 1))
-        if _MANY * pixel.size < keys.size:
-            x, y = (values.reshape(-1).take(pixel) for values in (x, y))
-            rays = _rays(self.reader, self.tiles.block.take(pixel >> 6), x, y)
-        else:
-            # A matrix a microtile, not a pixel: numbers that few pixels ask for cost less than looking it up.
-            every = _rays(self.reader, self.tiles.block[:, None], x, y)
-            rays = every.of(None if pixel.size == keys.size else pixel)
+        rays = rays_of(self.reader, self.samples, self.tiles, pixel)
         keys = keys if pixel.size == keys.size else keys.take(pixel)
         return pixel_hits(self.reader, self.tiles, keys, pixel, places, inside, rays)
+
+
+def rays_of(reader: Reader, samples: Samples, tiles: Tiles, pixel: IntArray) -> Rays:
+    """Rays of pixels (G,) of microtiles of patches, counted through all of these."""
+    x, y = (samples.place[k].take(tiles.index, axis=0) for k in (0, 1))
+    if _MANY * pixel.size < x.size:
+        x, y = (values.reshape(-1).take(pixel) for values in (x, y))
+        return _rays(reader, tiles.block.take(pixel >> 6), x, y)
+    # A matrix a microtile, not a pixel: numbers that few pixels ask for cost less than looking it up.
+    every = _rays(reader, tiles.block[:, None], x, y)
+    return every.of(None if _all_of(pixel, x.size) else pixel)
+
+
+def _all_of(pixel: IntArray, count: int) -> bool:
+    return pixel.size == count and bool((pixel == np.arange(count)).all())
 
 
 def _rays(reader: Reader, block: IntArray, x: FloatArray, y: FloatArray) -> Rays:
