@@ -136,7 +136,7 @@ packing-table: env ## pack every display by every method and write the tables of
 
 surfaces: env ## measure curved displays, and put tables and pictures into docs/surfaces.md
 	$(PY) -m tests.benchmarks.surfaces --docs
-	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png $(DOCS)/surfaces-two-eyes.png
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
 	$(PY) -m pytest tests/system/test_golden.py tests/system/test_golden_turn.py --update-golden
