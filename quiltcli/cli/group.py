@@ -13,6 +13,7 @@ from quiltcli.errors import QuiltError
 
 COMMANDS = (
     "assemble",
+    "board",
     "calibrate",
     "cameras",
     "capture",
