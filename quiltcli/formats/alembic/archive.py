@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,25 @@ def library() -> Any:
     return alembic3d
 
 
+@contextmanager
+def understood(path: Path) -> Iterator[None]:
+    """Turn what the library says of an archive into an error of ours.
+
+    Raises:
+        MeshError: something of the archive cannot be read.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        # The last of the places that it has come through says why.
+        reason = " ".join(str(error).split("EXCEPTION:")[-1].split())[:200]
+        advice = " (Ogawa archives are read, HDF5 ones are not)" if "core type" in reason else ""
+        words = f"is no Alembic file that can be read: {reason}{advice}"
+        raise MeshError(Problem(words, str(path))) from None
+    except UnicodeDecodeError:
+        raise MeshError(Problem("holds names that are no UTF-8", str(path))) from None
+
+
 def open_archive(path: Path | str) -> Archive:
     """Open an archive and look at all its objects.
 
@@ -92,15 +112,11 @@ def open_archive(path: Path | str) -> Archive:
     path = Path(path)
     check_input(path, MeshError, "a mesh")
     abc = library()
-    try:
+    with understood(path):
         opened = abc.Abc.IArchive(str(path))
         found = _Walk(path)
         found.take(opened.getTop())
         first, last = abc.Abc.GetArchiveStartAndEndTime(opened)
-    except RuntimeError as error:
-        words = f"is no Alembic file that can be read: {' '.join(str(error).split())[:200]}"
-        advice = " (Ogawa archives are read, of HDF5 ones none)"
-        raise MeshError(Problem(words + advice, str(path))) from None
     span = (float(first), float(last)) if first < last < float("inf") else None
     return Archive(path, tuple(found.pieces), span, tuple(found.notices()), opened)
 

@@ -95,7 +95,7 @@ def read_faces(archive: Archive, piece: Piece, seconds: float) -> Faces:
     Raises:
         MeshError: counts and indices do not fit one another, or name positions that are not there.
     """
-    sample = _sample(archive, piece, held(piece, seconds))
+    sample = piece.schema.getValue(held(piece, seconds))
     counts, indices = _whole(sample.getFaceCounts()), _whole(sample.getFaceIndices())
     vertices = len(sample.getPositions())
     if counts.size and counts.min() < 0:
@@ -117,11 +117,11 @@ def read_points(archive: Archive, piece: Piece, seconds: float, expected: int) -
     """
     schema = piece.schema
     span = between(schema.getTimeSampling(), schema.getNumSamples(), seconds)
-    points = _numbers(_sample(archive, piece, span.one).getPositions(), 3)
+    points = _numbers(schema.getValue(span.one).getPositions(), 3)
     if len(points) != expected:
         raise archive.error(piece, f"has {len(points):,} positions at {seconds:g} s (expected {expected:,})")
     if span.share and not changes_faces(piece):
-        following = _numbers(_sample(archive, piece, span.other).getPositions(), 3)
+        following = _numbers(schema.getValue(span.other).getPositions(), 3)
         if len(following) == len(points):
             return (1 - span.share) * points + span.share * following
     return points
@@ -205,14 +205,6 @@ def set_rows(archive: Archive, piece: Piece, faces: Faces, seconds: float) -> In
             )
         result[rows] = number + 1
     return result[faces.number]
-
-
-def _sample(archive: Archive, piece: Piece, selector: Any) -> Any:
-    try:
-        return piece.schema.getValue(selector)
-    except RuntimeError as error:
-        words = " ".join(str(error).split())[:200]
-        raise archive.error(piece, f"has a sample that cannot be read: {words}") from None
 
 
 def _numbers(values: Any, width: int) -> FloatArray:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,7 +19,9 @@ from quiltcli.geometry import FloatArray
 
 _LISTED = 8
 _LONGEST = 300
-_DEFAULT_RATE = 24.0
+# Binary stages are read, not mapped: memory does not grow with a cache, and one that is overwritten while it
+# is open is no crash. The library would say so on the terminal.
+_SETTINGS = (("USDC_USE_ASSET", "1"), ("TF_ENV_SETTING_ALERTS_ENABLED", "0"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +82,9 @@ def library() -> Any:
     Raises:
         MissingExtraError: it is not installed.
     """
+    if "pxr" not in sys.modules:
+        for name, value in _SETTINGS:
+            os.environ.setdefault(name, value)
     try:
         import pxr
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils, Vt
@@ -159,6 +166,7 @@ def _problem(path: Path, error: Exception) -> Problem:
 
 
 def _one_line(text: str) -> str:
+    text = re.sub(r" - \w+ thrown:.*", "", text, flags=re.DOTALL)
     words = " ".join(re.sub(r"pxrInternal\S*?::|, ?@anon:[^@]*@\S*|<0x[0-9a-f]+>", "", text).split())
     return words if len(words) <= _LONGEST else words[: _LONGEST - 1] + "…"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import MeshError, Problem
-from quiltcli.formats.alembic.archive import Archive, Piece, open_archive
+from quiltcli.formats.alembic.archive import Archive, Piece, open_archive, understood
 from quiltcli.formats.alembic.samples import (
     changes_faces,
     read_dress,
@@ -60,7 +60,8 @@ class AlembicModel:
     @property
     def notices(self) -> tuple[str, ...]:
         """What of the archive is not drawn as it means."""
-        return (*self.archive.notices, *self._flaws())
+        with understood(self.archive.path):
+            return (*self.archive.notices, *self._flaws())
 
     def _flaws(self) -> Iterator[str]:
         start = self._time(None, None)
@@ -81,16 +82,18 @@ class AlembicModel:
 
     def form(self, seconds: float | None, playing: Playing | None) -> Hashable:
         """What is equal at two times whose parts have the same triangles."""
-        time = self._time(seconds, playing)
-        seen = tuple(shown(piece, time) for piece in self.archive.pieces)
-        return seen, tuple(
-            read_faces(self.archive, piece, time).key if changes_faces(piece) else b""
-            for piece in self.archive.pieces
-        )
+        with understood(self.archive.path):
+            time = self._time(seconds, playing)
+            seen = tuple(shown(piece, time) for piece in self.archive.pieces)
+            return seen, tuple(
+                read_faces(self.archive, piece, time).key if changes_faces(piece) else b""
+                for piece in self.archive.pieces
+            )
 
     def hidden(self, seconds: float, playing: Playing) -> bool:
         """Whether nothing is to be seen at a time."""
-        return self._all_hidden(self._time(seconds, playing))
+        with understood(self.archive.path):
+            return self._all_hidden(self._time(seconds, playing))
 
     def parts(self, seconds: float | None = None, playing: Playing | None = None) -> tuple[Part, ...]:
         """A part for each mesh and set of faces; at rest as the animation begins.
@@ -98,31 +101,35 @@ class AlembicModel:
         Raises:
             MeshError: a mesh is broken, or there are too many triangles.
         """
-        time = self._time(seconds, playing)
-        everything = seconds is not None and self._all_hidden(time)
-        found: list[Part] = []
-        total = 0
-        for number, piece in enumerate(self.archive.pieces):
-            form = self._form(number, time)
-            total += form.triangles
-            if total > MOST_TRIANGLES:
-                words = f"and all before it show {total:,} triangles (expected at most {MOST_TRIANGLES:,})"
-                raise self.archive.error(piece, words)
-            places, posed = self._places(piece, time, everything), self._posed(number, time)
-            found += [part_of(form, cut, posed, places, _look(piece, form, cut.row)) for cut in form.cuts]
-        return tuple(found)
+        with understood(self.archive.path):
+            time = self._time(seconds, playing)
+            everything = seconds is not None and self._all_hidden(time)
+            found: list[Part] = []
+            total = 0
+            for number, piece in enumerate(self.archive.pieces):
+                form = self._form(number, time)
+                total += form.triangles
+                if total > MOST_TRIANGLES:
+                    words = (
+                        f"and all before it show {total:,} triangles (expected at most {MOST_TRIANGLES:,})"
+                    )
+                    raise self.archive.error(piece, words)
+                places, posed = self._places(piece, time, everything), self._posed(number, time)
+                found += [part_of(form, cut, posed, places, _look(piece, form, cut.row)) for cut in form.cuts]
+            return tuple(found)
 
     def pose(self, seconds: float, playing: Playing) -> tuple[FloatArray, FloatArray]:
         """Vertices and normals (V, 3) of all parts after one another at a time."""
-        time = self._time(seconds, playing)
-        everything = self._all_hidden(time)
-        placed = []
-        for number, piece in enumerate(self.archive.pieces):
-            form, posed = self._form(number, time), self._posed(number, time)
-            places = self._places(piece, time, everything)
-            placed += [placed_cut(form, cut, posed, places) for cut in form.cuts]
-        vertices, normals = joined(placed)
-        return at_one_place(vertices) if everything else vertices, normals
+        with understood(self.archive.path):
+            time = self._time(seconds, playing)
+            everything = self._all_hidden(time)
+            placed = []
+            for number, piece in enumerate(self.archive.pieces):
+                form, posed = self._form(number, time), self._posed(number, time)
+                places = self._places(piece, time, everything)
+                placed += [placed_cut(form, cut, posed, places) for cut in form.cuts]
+            vertices, normals = joined(placed)
+            return at_one_place(vertices) if everything else vertices, normals
 
     def lights(self, seconds: float | None = None, playing: Playing | None = None) -> tuple[FileLight, ...]:
         """None: lights of archives say nothing of how they shine."""

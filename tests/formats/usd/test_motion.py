@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -281,3 +284,39 @@ def test_prototypes_may_be_native_instances(tmp_path):
     text = f'def PointInstancer "i"\n{{\nrel prototypes = [</i/p>]\n{more}\n{use}\n}}\n'
     found = parts_of(stage(tmp_path / "a.usda", kind, text))
     assert [part.vertices[::4, 0].tolist() for part in found] == [[0, 5]]
+
+
+CUT_OFF = """
+import sys
+from pathlib import Path
+from quiltcli.errors import MeshError
+from quiltcli.scene.importers.model import Playing
+from quiltcli.scene.importers.usd import read_usd_model
+path = Path(sys.argv[1])
+model = read_usd_model(path)
+model.parts()
+with path.open("r+b") as file:
+    file.truncate(2000)
+try:
+    model.pose(20, Playing())
+except MeshError as error:
+    print(error)
+"""
+
+
+def test_a_stage_that_is_cut_off_while_it_is_open_is_an_error_and_no_crash(tmp_path):
+    from pxr import Sdf
+
+    samples = ", ".join(f"{k}: {listed([(x / 7, k, 0) for x in range(400)])}" for k in range(60))
+    text = mesh(points=f"point3f[] points.timeSamples = {{{samples}}}", counts=[4])
+    layer = Sdf.Layer.FindOrOpen(str(stage(tmp_path / "a.usda", text, timeCodesPerSecond=1)))
+    layer.Export(str(tmp_path / "b.usdc"))
+    found = subprocess.run(
+        [sys.executable, "-c", CUT_OFF, str(tmp_path / "b.usdc")], capture_output=True, text=True, check=False
+    )
+    assert found.returncode == 0
+    assert found.stdout.startswith(
+        f"{tmp_path / 'b.usdc'}: is no USD file that can be read: Read out-of-bounds"
+    )
+    assert "thrown" not in found.stdout
+    assert found.stderr == ""
