@@ -159,6 +159,8 @@ class PlaceSpec(Model):
     """World step to the next pixel down, metres."""
     polygon: Annotated[tuple[Point, ...], Listed, Field(min_length=3)]
     """Corners on the facet's raster, pixels."""
+    surface: str | None = None
+    """Of a curved facet its name, or kind; origin, du and dv are of a plane that touches it."""
 
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]

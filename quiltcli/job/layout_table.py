@@ -11,8 +11,8 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -92,10 +92,12 @@ class LayoutTable(Places):
     Attributes:
         head: the file's other keys; of its facets it may have the first alone.
         source: finds lines in the file.
+        surfaces: names of curved facets by id, where the file tells them.
     """
 
     head: LayoutFile
     source: Source | LayoutLines | ColumnLines
+    surfaces: Mapping[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,8 @@ def table_of(spec: LayoutFile) -> LayoutTable:
     if spec.columns is not None:
         return _from_columns(spec, read_columns(spec.columns, len(spec.pages), spec.columns_sha256))
     columns = {key: [getattr(facet, key) for facet in spec.facets or ()] for key in FACET_KEYS}
-    return _table(spec, spec.source, columns)
+    named = {facet.id: facet.surface for facet in spec.facets or () if facet.surface}
+    return replace(_table(spec, spec.source, columns), surfaces=named)
 
 
 def columns_of(places: Places) -> Columns:

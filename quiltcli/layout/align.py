@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -32,6 +33,7 @@ def align(layout: Layout, facets: Facets) -> Layout:
     raise_all(LayoutError, _strangers(layout, facets))
     raise_all(LayoutError, misfits(layout, facets))
     raise_all(LayoutError, _sheared(layout, facets))
+    raise_all(LayoutError, _renamed(layout, facets))
     row = np.full(facets.count, -1)
     row[layout.facet - 1] = np.arange(layout.facet.size)
     known = row >= 0
@@ -51,12 +53,33 @@ def align(layout: Layout, facets: Facets) -> Layout:
         corner_start=facets.corner_start,
         polygon=_polygons(layout, facets, row),
         file_row=None if layout.file_row is None else np.where(known, layout.file_row[row], 0),
+        surfaces=surface_names(facets),
         masks={
             number: chart.mask
             for number, chart in enumerate(facets.charts, 1)
             if chart is not None and chart.mask is not None
         },
     )
+
+
+def surface_names(facets: Facets) -> dict[int, str]:
+    """What curved facets are called in a layout, by id: their names, or else their kinds."""
+    return {
+        number: facets.names[number - 1] or str(json.loads(chart.record)["kind"])
+        for number, chart in enumerate(facets.charts, 1)
+        if chart is not None
+    }
+
+
+def _renamed(layout: Layout, facets: Facets) -> Iterator[Problem]:
+    """Curved facets that the layout calls by another name than the display."""
+    names = surface_names(facets)
+    for row, facet in enumerate(layout.facet.tolist()):
+        said, known = layout.surfaces.get(facet, ""), names.get(facet, "")
+        if said and said != known:
+            what = f"the surface {known!r}" if known else "flat"
+            message = f"facet {facet} is the surface {said!r} here, and {what} in {facets.path}"
+            yield layout.problem(message, row, "surface")
 
 
 def _sheared(layout: Layout, facets: Facets) -> Iterator[Problem]:

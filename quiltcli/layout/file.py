@@ -54,6 +54,7 @@ def layout_from_table(table: LayoutTable) -> Layout:
         path=str(table.source.path),
         place=table.source,
         file_row=order,
+        surfaces=table.surfaces,
     )
 
 
@@ -157,7 +158,12 @@ def _facet_lines(layout: Layout, row: int) -> list[str]:
         f"  page: {layout.page[row] + 1}",
         *(f"  {key}: {_flow(getattr(layout, key)[row])}" for key in _COLUMNS),
         f"  polygon: {_flow(layout.outline(row))}",
+        *_surface_line(layout.surfaces.get(int(layout.facet[row]), "")),
     ]
+
+
+def _surface_line(name: str) -> list[str]:
+    return [f"  surface: {json.dumps(name, ensure_ascii=False)}"] if name else []
 
 
 def _flow(values: np.ndarray) -> str:

@@ -48,6 +48,7 @@ class Layout(Places):
         place: finds lines in that file, None when it was made by the program.
         file_row: (F,) row of each facet in the file, None when it was made by the program.
         masks: by facet id, the pixels (H, W) of facets that are not all there.
+        surfaces: by facet id, names of curved facets.
     """
 
     method: str
@@ -58,6 +59,7 @@ class Layout(Places):
     place: Place | None = field(default=None, repr=False)
     file_row: IntArray | None = field(default=None, repr=False)
     masks: Mapping[int, BoolArray] = field(default_factory=dict, repr=False)
+    surfaces: Mapping[int, str] = field(default_factory=dict, repr=False)
 
     @property
     def page_offset(self) -> IntArray:

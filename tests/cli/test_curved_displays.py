@@ -11,6 +11,7 @@ from PIL import Image
 
 from quiltcli.cli import main
 from quiltcli.formats.exr.image import read_header
+from quiltcli.layout import read_layout, write_layout
 from tests.helpers.curved_jobs import boxes, curved_job
 
 SPHERE = "surfaces:\n- {name: ball, kind: sphere, radius: 1, pixels: [96, 48]}"
@@ -145,3 +146,33 @@ def test_a_layout_that_shears_a_surface_is_refused(tmp_path: Path) -> None:
     code, said = quilt("render", tmp_path / "job.yaml", "--set", f"layout={tmp_path / 'layout.yaml'}")
     assert code == 2
     assert "facet 1 is curved, and must move by whole pixels and quarter turns" in said
+
+
+def test_a_layout_names_its_surfaces_and_refuses_others(tmp_path: Path) -> None:
+    display = (
+        "surfaces:\n- {name: wall, kind: cylinder, radius: 2, height: 1, lit: inside, pixels: [96, 48]}\n"
+    )
+    curved_job(tmp_path, display + "- {kind: sphere, radius: 1, pixels: [64, 32]}", boxes(3, 0.5, 1.5))
+    path = tmp_path / "layout.yaml"
+    assert quilt("pack", tmp_path / "display.yaml", "-o", path)[0] == 0
+    text = path.read_text()
+    assert [line.strip() for line in text.splitlines() if "surface:" in line] == [
+        'surface: "wall"',
+        'surface: "sphere"',
+    ]
+    assert write_again(path) == text
+    layout = f"layout={path}"
+    assert quilt("render", tmp_path / "job.yaml", "-j", "1", "--set", layout)[0] == 0
+    assert 'surface: "wall"' in (tmp_path / "out" / "layout.yaml").read_text()
+    path.write_text(text.replace('"sphere"', '"dome"'))
+    code, said = quilt("render", tmp_path / "job.yaml", "--overwrite", "--set", layout)
+    assert code == 2
+    assert "facet 2 is the surface 'dome' here, and the surface 'sphere' in" in said
+    assert "surface: " in said
+
+
+def write_again(path: Path) -> str:
+    """A layout file, read and written."""
+    again = path.with_name("again.yaml")
+    write_layout(read_layout(path), again)
+    return again.read_text()

@@ -13,6 +13,7 @@ from quiltcli.display.weld import weld
 from quiltcli.errors import LayoutError, Problem, raise_all
 from quiltcli.geometry import Int32Array, IntArray, offsets, segments
 from quiltcli.job.layout import PACKING_METHODS, PackSpec
+from quiltcli.layout.align import surface_names
 from quiltcli.layout.from_uv import layout_from_polygons
 from quiltcli.layout.layout import Layout
 from quiltcli.layout.packing.methods import METHODS, has_all_arrangements
@@ -41,7 +42,12 @@ def pack(facets: Facets, wishes: PackSpec | None = None) -> Layout:
         LayoutError: a facet is larger than the page, or there are more pages than allowed; the message
             says what would do.
     """
-    wishes = wishes or PackSpec()
+    layout = _packed_layout(facets, wishes or PackSpec())
+    return replace(layout, surfaces=surface_names(facets)) if facets.charts else layout
+
+
+def _packed_layout(facets: Facets, wishes: PackSpec) -> Layout:
+    """The layout but for names; see `pack`."""
     raise_all(LayoutError, _bad_arguments(facets, wishes))
     pins = all_pins(facets, wishes)
     waiting = facets.enabled.copy()
