@@ -14,7 +14,7 @@ import numpy as np
 from quiltcli.display import demand_flat
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.exchange.elsewhere import Made, MadeOptions, prepare_made, write_made
-from quiltcli.exchange.project.lenses import Lens
+from quiltcli.exchange.project.lenses import WORLD, Lens
 from quiltcli.exchange.project.master import Master, loaded
 from quiltcli.exchange.project.stmap import write_st_maps
 from quiltcli.exchange.project.texels import Texels
@@ -120,8 +120,10 @@ def _fill(
 ) -> Made:
     """Fill the buffers of a view."""
     lens, texels = _lookup(master, kept, view)
+    # Rays along the lens's own axes need not be turned to them pixel by pixel.
+    axes, lens = lens.axes, replace(lens, axes=WORLD)
     task = Projected(stage, lens, texels, buffers)
-    shown = list(pool.map(lambda band: _band(task, *band), list(_bands(stage, view))))
+    shown = list(pool.map(lambda band: _band(task, *band), list(_bands(stage, view, axes))))
     whole, seen = sum(pixels for pixels, _ in shown), sum(count for _, count in shown)
     dark = 1 - seen / whole if whole else 0.0
     warnings = [f"the picture does not show {dark:.1%} of the lit facets' pixels"] if dark > 0.0005 else []
@@ -151,15 +153,15 @@ def _lookup(master: Master, kept: Kept, view: View) -> tuple[Lens, Texels]:
     return master.lens(view, kept[key].size), kept[key]
 
 
-def _bands(stage: Stage, view: View) -> Iterator[tuple[int, Window, FloatArray]]:
-    """Rows of tiles on the pages: the facet's row in the layout, a window, and its rays."""
+def _bands(stage: Stage, view: View, axes: FloatArray) -> Iterator[tuple[int, Window, FloatArray]]:
+    """Rows of tiles on the pages: the facet's row in the layout, a window, and its rays along some axes."""
     for viewer in view.viewers:
         lit = their_lit_facets(stage.facets, viewer) & (stage.layout.page >= 0)
         rays = eye_from_quilt(stage.layout, viewer.eye)
         for row in np.flatnonzero(lit).tolist():
             whole = Window(*surroundings(stage.layout, row, stage.job.render.bleed + 1))
             for band in whole.tiles(whole.x1 - whole.x0, TILE[1]):
-                yield row, band, rays[row]
+                yield row, band, axes @ rays[row]
 
 
 def _band(task: Projected, row: int, band: Window, rays: FloatArray) -> tuple[int, int]:
