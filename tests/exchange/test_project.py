@@ -163,6 +163,23 @@ def test_waves_on_a_floor_below_a_panorama_are_averaged_over_pixels():
     assert np.sqrt((off * off).mean()) < 0.006
 
 
+def test_stripes_of_a_texel_are_grey_at_the_pole():
+    """Meridians of every other texel: pixels that span many of them average them, whichever way they lie."""
+    lens = Equirect(axes_of(0, 0), (1024, 512))
+    stripes = np.zeros((512, 1024, 4), np.float32)
+    stripes[:, ::2] = 1
+    size = 240
+    rays = np.array([[0.6 / size, 0, -0.3], [0, 0, -1.0], [0, 0.6 / size, -0.3]])
+    picture = texels([stripes], lens)
+    for x, y in ((125, 125), (125, 95), (95, 125), (136, 104)):
+        window = Window(x, y, x + 16, y + 16)
+        nx, ny, by_axes = _counts(window, rays, lens)
+        assert by_axes
+        assert nx > 3 * ny
+        light = tile_light(window, rays, lens, picture)[..., 0]
+        assert np.abs(light - 0.5).max() < 0.12
+
+
 def test_faces_are_upright_for_who_turns_to_them():
     looks = {
         "front": (0, 0),
