@@ -147,6 +147,11 @@ def job_text(wishes: Wishes, stand: Stand, frames: tuple[int, ...]) -> str:
     layout = "layout: layout.yaml\n" if wishes.canvas else ""
     # Neighbours that touch on the canvas leave no room to bleed into.
     bleed = f"render:\n  bleed: {wishes.padding}\n" if wishes.canvas and wishes.padding < 2 else ""
+    alone = (
+        "  facets: false   # the canvas alone; true writes each panel's picture as well\n"
+        if wishes.canvas
+        else ""
+    )
     return (
         "#     quilt check job.yaml                        every mistake in these files, at once\n"
         "#     quilt simulate job.yaml -f 1 -o eye.png     what the viewer will see\n"
@@ -161,7 +166,7 @@ def job_text(wishes: Wishes, stand: Stand, frames: tuple[int, ...]) -> str:
         f"  path:\n{_path(stand, frames)}"
         f"{bleed}"
         "output:\n"
-        "  directory: out\n"
+        f"  directory: out\n{alone}"
     )
 
 
