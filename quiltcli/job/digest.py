@@ -12,6 +12,7 @@ from typing import Any
 from quiltcli.formats.gltf.container import files_beside
 from quiltcli.formats.mesh.mtl import read_mtl
 from quiltcli.formats.noted import note_digest, note_input, noted_digest
+from quiltcli.formats.usd import SUFFIXES
 from quiltcli.job.dump import plain
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import PackSpec
@@ -35,7 +36,7 @@ def job_sha256(job: JobFile) -> str:
     read, whatever they are by now.
     """
     data = plain(job, file_sha256)
-    data["display"] = plain(load_any_display(job.display), file_sha256)
+    data["display"] = _display(job.display)
     data["scene"] = _scene(job.scene) if job.lightfield is None else _lightfield(job.scene, job.frames)
     if isinstance(job.layout, Path):
         data["layout"] = _layout_sha256(job.layout)
@@ -45,6 +46,8 @@ def job_sha256(job: JobFile) -> str:
         del data["render"]["scale"]  # what there was before there was this key
     else:
         data["layout"] = "packed anew"
+    if job.render.corrections:
+        del data["render"]["corrections"]  # likewise
     del data["frames"], data["render"]["texture_memory"]
     data["output"] = {key: data["output"][key] for key in ("channels", "compression", "data_window")}
     return _text_sha256(data)
@@ -68,6 +71,14 @@ def _layout_sha256(path: Path) -> str:
 def _text_sha256(data: Any) -> str:
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _display(path: Path) -> dict[str, Any]:
+    """A display, with the display that is its screen."""
+    display = load_any_display(path)
+    data: dict[str, Any] = plain(display, file_sha256)
+    screen = getattr(display, "screen", None)
+    return data if screen is None else data | {"screen": plain(load_any_display(screen), file_sha256)}
 
 
 def _scene(path: Path) -> dict[str, Any]:
@@ -120,6 +131,10 @@ def _drawn_in(path: Path) -> Iterator[Path]:
     suffix = path.suffix.lower()
     if suffix in (".gltf", ".glb"):
         yield from files_beside(path)
+    if suffix in SUFFIXES:
+        from quiltcli.formats.usd.stage import files_beside as files_of_stage
+
+        yield from files_of_stage(path)
     if suffix == ".obj":
         for name in _named(path, rb"mtllib"):
             yield path.parent / name

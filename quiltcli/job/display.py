@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainValidator, WithJsonSchema
 
 from quiltcli import geometry
+from quiltcli.job.corrections import CorrectionsSpec
 from quiltcli.job.layout import UvLayoutSpec
 from quiltcli.job.lengths import UNITS, Coordinate, Length, UpAxis, exact_metres, read_length, up_matrix
 from quiltcli.job.model import (
     FARTHEST,
+    YAMLS,
     Complaint,
     Count,
     Direction,
+    ExistingFile,
     FileModel,
     Items,
     Listed,
@@ -33,7 +37,9 @@ from quiltcli.job.model import (
     one_of,
 )
 from quiltcli.job.places import PlaceOnPage, Quarter
+from quiltcli.job.points import PointsSpec
 from quiltcli.job.projections import ProjectionSpec
+from quiltcli.job.projectors import BlendSpec, ProjectorSpec
 from quiltcli.job.surfaces import SurfaceSpec
 
 
@@ -214,8 +220,16 @@ class DisplayFile(FileModel):
     """Flat rectangles instead of a mesh; every panel is one facet, in this order."""
     surfaces: Annotated[tuple[SurfaceSpec, ...], Listed, Field(min_length=1)] | None = None
     """Curved surfaces, instead of a mesh or panels or beside them; each is one facet, after the others."""
+    points: PointsSpec | None = None
+    """Single lights, instead of a mesh, panels or surfaces; each is a facet of one pixel."""
     projection: ProjectionSpec | None = None
     """A picture around the eye that goes along with it, instead of anything that stands in the world."""
+    projectors: Annotated[tuple[ProjectorSpec, ...], Listed, Field(min_length=1)] | None = None
+    """Projectors instead of anything that shines itself; each is one facet, in this order."""
+    screen: Annotated[Path, ExistingFile(YAMLS, "a display file")] | None = None
+    """What the projectors light: a display file with a mesh, panels or surfaces, whatever their pixels."""
+    blend: BlendSpec | None = None
+    """How pictures of projectors overlap; they add up as they are when absent."""
     units: Units = "m"
     """What the mesh or the panels are measured in: m, cm, mm, in, ft, or a number of metres."""
     up_axis: UpAxis = "y"
@@ -229,6 +243,8 @@ class DisplayFile(FileModel):
     """What is different on single facets, by facet id."""
     transform: TransformSpec | None = None
     """Place of the display in the world."""
+    corrections: CorrectionsSpec | None = None
+    """What the panels make of their images, which the images make up for."""
     layout: UvLayoutSpec | None = None
     """Take the layout from the texture coordinates of the mesh."""
 
@@ -247,8 +263,14 @@ class DisplayFile(FileModel):
 
     def cross_checks(self) -> Iterator[Complaint]:
         """A mesh or panels, each with keys of its own; a mirrored display would be lit on the wrong side."""
+        yield from self._of_projectors()
+        if self.projectors is not None:
+            return
         if self.projection is not None:
             yield from self._beside_projection()
+            return
+        if self.points is not None:
+            yield from self._beside_points()
             return
         if self.mesh is None and self.panels is None and self.surfaces is None:
             words = "missing key (polygon mesh; or panels: flat rectangles; or surfaces; or a projection)"
@@ -280,15 +302,48 @@ class DisplayFile(FileModel):
                 "expected front or both beside panels (turn one by yaw_deg: 180), got back",
             )
 
+    def _of_projectors(self) -> Iterator[Complaint]:
+        """Projectors are all of their display, and need a screen; nothing else has one."""
+        if self.projectors is None:
+            for name in ("screen", "blend"):
+                if getattr(self, name) is not None:
+                    yield (name,), "belongs to projectors (expected projectors: a list of them)"
+            return
+        for name in ("mesh", "panels", "surfaces", "projection", "resolution", "transform", "layout"):
+            if getattr(self, name) is not None:
+                yield (name,), "cannot stand beside projectors (the screen's file says where it stands)"
+        if self.facets:
+            yield ("facets",), "cannot stand beside projectors (name, mask and place are keys of each)"
+        for name, default in (("viewing_side", "front"), ("up_axis", "y")):
+            if getattr(self, name) != default:
+                yield (name,), f"cannot stand beside projectors, got {getattr(self, name)}"
+        if self.screen is None and any(one.map is None for one in self.projectors):
+            yield ("screen",), "missing key (a display file: what the projectors light)"
+
     def _beside_projection(self) -> Iterator[Complaint]:
         """A projection is all of its display, and stands nowhere in the world."""
-        for name in ("mesh", "panels", "surfaces", "resolution", "transform", "layout"):
+        for name in ("mesh", "panels", "surfaces", "points", "resolution", "transform", "layout"):
             if getattr(self, name) is not None:
                 yield (name,), "cannot stand beside projection (a projection is the whole display)"
         if self.facets:
             yield ("facets",), "cannot stand beside projection (a projection is the whole display)"
         if self.viewing_side != "front":
             yield ("viewing_side",), f"cannot stand beside projection, got {self.viewing_side}"
+
+    def _beside_points(self) -> Iterator[Complaint]:
+        """Points are all of their display, and are lit to all sides."""
+        for name in ("mesh", "panels", "surfaces", "resolution", "layout"):
+            if getattr(self, name) is not None:
+                yield (name,), "cannot stand beside points (points are the whole display, a pixel each)"
+        if self.facets:
+            yield ("facets",), "cannot stand beside points (points are the whole display, a pixel each)"
+        if self.viewing_side == "back":
+            yield (
+                ("viewing_side",),
+                "expected no such key beside points (lit to all sides), got back",
+            )
+        if self.transform is not None and np.linalg.det(self.transform.array[:3, :3]) < 0:
+            yield ("transform",), "mirrors the display (its determinant is negative)"
 
     def _surfaces_alone(self) -> Iterator[Complaint]:
         """What only a mesh or panels can have."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from quiltcli.geometry import FloatArray
+from quiltcli.projection.curved import ChartView
 from quiltcli.projection.planar import QuiltRays, inverse_3x3
 from quiltcli.viewer.viewer import Viewer
 
@@ -29,6 +30,25 @@ class Gaze:
         """Their rays a frame later, through the facets that are lit now."""
         assert self.rays is not None
         return self.rays if self.viewer.then is None else seen_from(self.rays, self.viewer.then)
+
+    @property
+    def turns(self) -> bool:
+        """Whether their head is turned otherwise a frame later."""
+        then = self.viewer.then_turn
+        return then is not None and not np.array_equal(then, self.viewer.camera_from_world)
+
+    @cached_property
+    def later_views(self) -> tuple[ChartView | None, ...]:
+        """What they see of curved facets a frame later; None for flat ones, empty where all are."""
+        assert self.rays is not None
+        eye = self.rays.eye if self.viewer.then is None else self.viewer.then
+        turn = self.viewer.then_turn
+        return tuple(
+            None
+            if view is None
+            else replace(view, eye=eye, turn=view.turn if view.turn is None or turn is None else turn.T)
+            for view in self.rays.views
+        )
 
 
 def seen_from(rays: QuiltRays, eye: FloatArray) -> QuiltRays:

@@ -90,7 +90,8 @@ def add_samples(
     """
     scene, wanted, count = stage.scene, wanted_for(sums.channels, stage.scene), stage.job.render.samples
     done = None
-    if len(places) >= _WORTH_SETTLING and frame.order is None and may_be_once(scene):
+    once = len(places) >= _WORTH_SETTLING and not stage.job.render.sample_shading
+    if once and frame.order is None and may_be_once(scene):
         done = _add_settled(stage, frame, batch, sums, len(places))
     for place in places:
         sample = Sample(sample_places(count).index(place), count)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.geometry import BoolArray, Float32Array, IntArray
 from quiltcli.projection.gaze import Gaze
 from quiltcli.render.antialiasing import draw_samples, new_batch_sums
 from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
 from quiltcli.render.setup import Stage
-from quiltcli.render.sums import summed
+from quiltcli.render.sums import Sums, summed
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
-from quiltcli.shading.layers import layers
+from quiltcli.shading.layers import Layer, layers
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
 
@@ -94,10 +95,24 @@ def draw_layers(
 
     Light goes through all layers; other channels are those of the first that holds up any.
     """
-    light = summed(channels)
-    data = tuple(name for name in channels if name not in light)
-    sums, visible = new_batch_sums(stage, batch, light), 0
-    for layer in layers(drawing, wanted, stage.scene, gaze.viewer.eye):
+    found = layers(drawing, wanted, stage.scene, gaze.viewer.eye)
+    sums = new_batch_sums(stage, batch, summed(channels))
+    return put_layers(found, sums, buffers, channels, gaze, stage.scene.background, order)
+
+
+def put_layers(
+    found: Iterable[Layer],
+    sums: Sums,
+    buffers: Buffers,
+    channels: tuple[str, ...],
+    gaze: Gaze,
+    background: Float32Array,
+    order: DepthOrder | None = None,
+) -> int:
+    """Write channels at the pixels of layers, see `draw_layers`; `sums`, empty, are of those of light."""
+    light = sums.channels
+    data, visible = tuple(name for name in channels if name not in light), 0
+    for layer in found:
         if light:
             sums.add(layer.shaded, layer.weight)
         if layer.first.any():
@@ -107,7 +122,7 @@ def draw_layers(
             if order is not None:
                 fill_stored(buffers, order, layer.shaded.hits, mine)
     if light:
-        sums.store(buffers, 1, stage.scene.background)
+        sums.store(buffers, 1, background)
     return visible
 
 

@@ -64,7 +64,10 @@ def moment(stage: Stage, view: View) -> Moment:
     if "motion" in stage.job.output.channels:
         try:
             then = _same_eye(view, views_at(stage.job, view.frame + 1, stage.clip))
-            viewers = [replace(a, then=b.eye) for a, b in zip(view.viewers, then.viewers, strict=True)]
+            viewers = [
+                replace(a, then=b.eye, then_turn=b.camera_from_world)
+                for a, b in zip(view.viewers, then.viewers, strict=True)
+            ]
             view = replace(view, viewers=tuple(viewers))
         except ViewerError:
             warnings.append("the path ends here: motion is that of a viewer at rest")

@@ -111,8 +111,8 @@ def set_stage(job: JobFile, folder: Path | None = None) -> Stage:
     demand_memory(job, layout)
     store = TextureStore(texture_limits(job))
     scene, source = load_moving_scene(scene_spec(job), float(job.fps), store)
-    if facets.charts and scene.soft is not None:
-        words = "has surfaces that light passes, which curved facets do not show yet (expected opaque ones)"
+    if job.render.method == "tessellate" and scene.soft is not None:
+        words = "has surfaces that light passes, which tessellate does not show (expected opaque ones)"
         raise SceneError(Problem(words, file=str(job.scene)))
     demand_shadows(scene)
     return replace(stage_of(job, facets, layout, scene, job.render.bleed), source=source)

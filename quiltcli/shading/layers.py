@@ -6,22 +6,20 @@ colour c adds T·α·c, and T becomes T·(1 − α) (Porter & Duff 1984, over). 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray
 from quiltcli.scene import Scene
-from quiltcli.scene.scene import ALPHAS
 from quiltcli.shading.adaptive import Shaded
-from quiltcli.shading.materials import albedo_wants, alpha_at, at_materials
+from quiltcli.shading.opacity import opacity_at, opacity_wants
 from quiltcli.shading.shadows import CENTRE, Sample
 from quiltcli.visibility.draw import Drawing, Wanted
-from quiltcli.visibility.resolve.hits import Points
+from quiltcli.visibility.resolve.layers import LayerHits
 
 _ONE = np.float32(1)
-_OPAQUE, _MASK = ALPHAS.index("opaque"), ALPHAS.index("mask")
 
 
 @dataclass(frozen=True)
@@ -41,31 +39,6 @@ class Layer:
     inside: BoolArray
 
 
-def opacity_at(scene: Scene, seen: Points) -> Float32Array:
-    """The share of light (n, k) that points hold up."""
-    table = scene.materials
-    assert table.opacity is not None
-    assert table.alpha is not None
-    assert table.cutoff is not None
-    (alpha,) = at_materials(scene, table.opacity[:, None], seen.triangle)
-    alpha = alpha * alpha_at(scene, seen)
-    if scene.corner_opacities is not None:
-        assert seen.weights is not None
-        first, second, third = scene.corner_opacities.take(seen.triangle, axis=0).transpose(2, 0, 1)
-        alpha = alpha * (first + seen.weights[0] * second + seen.weights[1] * third)
-    means = table.alpha.take(scene.material.take(seen.triangle))
-    cutoff = table.cutoff.take(scene.material.take(seen.triangle))
-    alpha = np.where(means == _MASK, (alpha >= cutoff).astype(np.float32), alpha)
-    alpha = np.where(means == _OPAQUE, _ONE, alpha)
-    return np.asarray(np.minimum(np.maximum(alpha, np.float32(0)), _ONE), dtype=np.float32)
-
-
-def opacity_wants(scene: Scene) -> Wanted:
-    """What `opacity_at` asks of hits."""
-    wanted = Wanted.NOTHING if scene.corner_opacities is None else Wanted.WEIGHTS
-    return wanted | albedo_wants(scene)
-
-
 def layers(
     drawing: Drawing, wanted: Wanted, scene: Scene, eye: FloatArray, sample: Sample = CENTRE
 ) -> Iterator[Layer]:
@@ -78,12 +51,31 @@ def layers(
         eye: (3,) from where it is seen.
         sample: which sample of its pixels was drawn.
     """
-    if drawing.soft is None:
-        return
-    passed = np.ones(drawing.soft.pixel.size, dtype=np.float32)
-    light = np.ones(passed.size, dtype=np.bool_)
-    seen = np.zeros(passed.size, dtype=np.bool_)
-    for one in drawing.layers(light, wanted | opacity_wants(scene), scene):
+    if drawing.soft is not None:
+        light = np.ones(drawing.soft.pixel.size, dtype=np.bool_)
+        found = drawing.layers(light, wanted | opacity_wants(scene), scene)
+        yield from blended(found, light, scene, eye, sample)
+
+
+def blended(
+    found: Iterable[LayerHits],
+    light: BoolArray,
+    scene: Scene,
+    eye: FloatArray,
+    sample: Sample = CENTRE,
+) -> Iterator[Layer]:
+    """Layers with the share of their pixels' light that each has.
+
+    Args:
+        found: the hits of all layers, the nearest first; with what `opacity_wants`.
+        light: (n,) pixels that light still passes, of which their rows tell; kept up to date.
+        scene: what is seen.
+        eye: (3,) from where it is seen.
+        sample: which sample of its pixels they are.
+    """
+    passed = np.ones(light.size, dtype=np.float32)
+    seen = np.zeros(light.size, dtype=np.bool_)
+    for one in found:
         opacity = opacity_at(scene, one.hits.points).reshape(-1)
         through = passed.take(one.row)
         some = opacity > 0

@@ -27,9 +27,10 @@ from quiltcli.scene.lights import (
     Spot,
 )
 from quiltcli.scene.scene import Scene
+from quiltcli.shading.dimmed import let_through
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.rays.blockers import Blockers, blockers_of
-from quiltcli.visibility.resolve.vectors import sum_of_products, vector_values
+from quiltcli.visibility.resolve.vectors import PointVectors, sum_of_products, vector_values
 
 _SHORT_OF = 1 - 2.0**-12
 """Where a ray to a lamp ends, of the way to it: what touches the lamp hides nothing."""
@@ -82,6 +83,10 @@ class Shadows:
         """What may be in the way."""
         return blockers_of(self.scene)
 
+    def open(self, places: FloatArray, way: FloatArray | Float32Array, far: float) -> Float32Array:
+        """The share (C,) of light that rays bring; see `dimmed.let_through`."""
+        return let_through(self.scene, self.blockers, places, way.astype(np.float32, copy=False), far)
+
     def _starts(self, rows: IntArray, chosen: IntArray) -> Starts:
         """Where rays from chosen points of some groups (R,) start: above the surface, on the eye's side."""
         points, blockers = self.surface.points, self.blockers
@@ -89,7 +94,10 @@ class Shadows:
         triangle, position = points.triangle[rows, 0], points.position[:, rows]
         table = self.scene.corner_normals.take(triangle, axis=0)
         normal = table[:, 9:12].T[:, :, None]
-        side = -np.sign(sum_of_products(normal, position[:, :, :1]))
+        ray = self.surface.ray
+        # Where every point has an eye of its own, as on a spinning mirror, its ray says what side that is on.
+        seen = ray[rows].values if isinstance(ray, PointVectors) else position
+        side = -np.sign(sum_of_products(normal, seen[:, :, :1].astype(np.float64)))
         places = position + (self.surface.eye - blockers.middle)[:, None, None]
         places += normal * (side * blockers.above.take(triangle)[:, None])
         bent = np.flatnonzero(blockers.bent.take(triangle))
@@ -153,13 +161,11 @@ class Starts:
 
 
 def _directional(light: Directional, starts: Starts, shadows: Shadows) -> Float32Array:
-    hidden = shadows.blockers.hide(starts.places, -light.direction[:, None], _AFAR)
-    return (~hidden).astype(np.float32)
+    return shadows.open(starts.places, -light.direction[:, None], _AFAR)
 
 
 def _point(light: Point, starts: Starts, shadows: Shadows) -> Float32Array:
-    hidden = shadows.blockers.hide(starts.places, starts.way_to(light.position, shadows), _SHORT_OF)
-    return (~hidden).astype(np.float32)
+    return shadows.open(starts.places, starts.way_to(light.position, shadows), _SHORT_OF)
 
 
 def _area(light: Area, starts: Starts, shadows: Shadows) -> Float32Array:
@@ -180,9 +186,8 @@ def _area(light: Area, starts: Starts, shadows: Shadows) -> Float32Array:
         light_of_it = np.maximum(sum_of_products(starts.normals, way), 0)
         light_of_it *= np.maximum(-sum_of_products(way, shines), 0)
         light_of_it /= np.maximum(length2 * length2, np.float32(1e-12))
-        hidden = shadows.blockers.hide(starts.places, way, _SHORT_OF)
         all_of_it[rows] += light_of_it
-        seen[rows] += np.where(hidden, np.float32(0), light_of_it)
+        seen[rows] += shadows.open(starts.places, way, _SHORT_OF) * light_of_it
     result: Float32Array = np.divide(seen, all_of_it, out=np.ones_like(seen), where=all_of_it > 0)
     return result
 
@@ -198,9 +203,8 @@ def _everywhere(light: Everywhere, starts: Starts, shadows: Shadows) -> Float32A
         if not rows.size:
             continue
         light_of_it = light_of_it[rows] * weight
-        hidden = shadows.blockers.hide(starts.places[:, rows], way[:, None], far)
         all_of_it[rows] += light_of_it
-        seen[rows] += np.where(hidden, np.float32(0), light_of_it)
+        seen[rows] += shadows.open(starts.places[:, rows], way[:, None], far) * light_of_it
     result: Float32Array = np.divide(seen, all_of_it, out=np.ones_like(seen), where=all_of_it > 0)
     return result
 

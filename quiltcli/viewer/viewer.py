@@ -35,6 +35,7 @@ class Viewer:
         facets: ids of the only facets that are theirs; None for all.
         aimed: whether the path says how the head is turned; otherwise `look` goes to the display's middle.
         then: (3,) where the eye is a frame later, world metres; None for at the same place.
+        then_turn: (3, 3) `camera_from_world` a frame later; None for the same.
     """
 
     frame: int
@@ -50,6 +51,7 @@ class Viewer:
     facets: tuple[int, ...] | None = None
     aimed: bool = True
     then: FloatArray | None = None
+    then_turn: FloatArray | None = None
 
     @property
     def camera_from_world(self) -> FloatArray:

@@ -30,7 +30,7 @@ from quiltcli.visibility.resolve.visibility import SQUARE, Region, read_canvas
 from quiltcli.visibility.resolve.whole import WholeTiles
 from quiltcli.visibility.scan.depth import DepthRange, triangles_in_range
 from quiltcli.visibility.scan.depth_buffers import DepthOrder
-from quiltcli.visibility.scan.displaced import draw_displaced
+from quiltcli.visibility.scan.displaced import displaced_fragments, draw_displaced
 from quiltcli.visibility.scan.keys import serial_bits
 from quiltcli.visibility.scan.large import covering_keys, draw_large
 from quiltcli.visibility.scan.order import BatchOrder
@@ -170,7 +170,7 @@ class Drawing:
             scene: what was drawn.
         """
         assert self.soft is not None
-        return layer_hits(self._reader(wanted, scene), self.soft, light)
+        return layer_hits(self._reader(wanted, scene), self.soft, light, self.samples)
 
     def hits(self, wanted: Wanted = Wanted.NOTHING, scene: Scene | None = None) -> Iterator[Hits]:
         """What the pixels see, each of the batch at most once; see `regions`."""
@@ -303,7 +303,14 @@ def _draw_patches(
     if settled:
         canvas.used[:] = False
         return Drawing(frame.blocks, canvas, table, limits, bits)
-    some = np.flatnonzero((pairs.box[1] >= pairs.box[0]) & (pairs.box[3] >= pairs.box[2]))
-    planes = table.add(pairs, some, DISPLACED).compact()
+    some = (pairs.box[1] >= pairs.box[0]) & (pairs.box[3] >= pairs.box[2])
+    light = np.zeros(0, dtype=np.int64)
+    if frame.sight.soft is not None:
+        some, light = apart(pairs, frame.sight.soft, some)
+    planes = table.add(pairs, np.flatnonzero(some), DISPLACED).compact()
     draw_displaced(planes, canvas, samples, limits, bits)
-    return Drawing(frame.blocks, canvas, table, limits, bits, samples, cells)
+    soft = None
+    if light.size:
+        planes = table.add(pairs, light, DISPLACED).compact()
+        soft = displaced_fragments(planes, canvas, samples, limits, bits)
+    return Drawing(frame.blocks, canvas, table, limits, bits, samples, cells, soft)

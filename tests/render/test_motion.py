@@ -185,3 +185,81 @@ def test_images_of_parts_say_the_same(tmp_path):
     }
     # Facets are merged into a quilt of parts as into any other.
     render(load_job(job), RenderOptions(frames=[1], folder=tmp_path / "parts", threads=1, facets=[1]))
+
+
+CURVED = {
+    "inside of a cylinder": (
+        "surfaces:\n- {kind: cylinder, radius: 1.5, height: 1.6, lit: inside, pixels: [512, 96]}",
+        "position: [0.2, 0.1, 0.3], look_at: [0, 0, -1]",
+        "position: [0.26, 0.12, 0.25], look_at: [0.1, 0, -1]",
+    ),
+    "outside of a sphere": (
+        "surfaces:\n- {kind: sphere, radius: 0.9, pixels: [512, 256]}",
+        "position: [0.3, 0.4, 2.6], look_at: [0, 0, 0]",
+        "position: [0.42, 0.38, 2.5], look_at: [0, 0, 0]",
+    ),
+    "panorama": (
+        "projection: {kind: equirect, pixels: [512, 256]}",
+        "position: [0.2, 0.1, 0.3], look_at: [0, 0, -1]",
+        "position: [0.26, 0.12, 0.25], look_at: [0.1, 0, -1]",
+    ),
+    "fisheye that turns with the view": (
+        "projection: {kind: fisheye, fov_deg: 180, follows: view, pixels: [256, 256]}",
+        "position: [0.2, 0.1, 1.3], look_at: [0, 0, -1]",
+        "position: [0.2, 0.1, 1.3], look_at: [0.1, 0.05, -1]",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CURVED)
+@pytest.mark.parametrize("method", ["homography", "raycast"])
+def test_on_curved_facets_a_point_is_found_where_motion_says(tmp_path, name, method):
+    """The chart's ray a frame later, through the place motion names, passes the point's later place."""
+    display, now_at, then_at = CURVED[name]
+    write_tiny_job(tmp_path)
+    (tmp_path / "display.yaml").write_text(f"quilt_display: 1\n{display}\n")
+    replaced(tmp_path, "scene.yaml", "mesh: ball.obj", f"mesh: ball.obj, {TURNING}")
+    far = 0.0 if "sphere" in name else -1.6
+    replaced(tmp_path, "scene.yaml", "translate: [0.1, 0, 0]", f"translate: [0.1, 0, {far}]")
+    replaced(tmp_path, "scene.yaml", "{frame: 1}", f"{{frame: 1, translate: [0, 0, {far}]}}")
+    (tmp_path / "job.yaml").write_text(
+        "quilt_job: 1\ndisplay: display.yaml\nscene: scene.yaml\nframes: 1-2\n"
+        "output: {channels: [Z, P, motion, triangle]}\nviewer:\n  near: 0.05\n  far: 20\n  path:\n"
+        f"    keyframes:\n    - {{frame: 1, {now_at}}}\n    - {{frame: 2, {then_at}}}\n"
+        f"render: {{method: {method}, depth: radial}}\n"
+    )
+    stage = set_stage(load_job(tmp_path / "job.yaml"))
+    _, buffers, _ = drawn(stage, 1)
+    seen = np.flatnonzero(np.isfinite(buffers["Z"]) & (stage.owners > 0))
+    assert seen.size > 200
+    point = np.stack([buffers[f"P.{axis}"][seen] for axis in "XYZ"], axis=-1).astype(float)
+    matrix = stage.source.objects[0].item.world_from_mesh(2)
+    later = of_object(stage, 1, point) @ matrix[:3, :3].T + matrix[:3, 3]
+    then = stage.views([2])[0].viewer
+    rays = stage.rays(np.ones(1, bool), then).views[0]
+    width = int(stage.layout.pages[0, 0])
+    x, y = seen % width + 0.5, seen // width + 0.5
+    right, down = buffers["motion.X"][seen], buffers["motion.Y"][seen]
+    moved = (right != 0) | (down != 0)
+    assert moved.mean() > 0.97
+    assert np.hypot(right, down).max() > 2
+    way = rays.rays(x + right, y + down)
+    way /= np.linalg.norm(way, axis=0)
+    to = (later - then.eye).T
+    to /= np.linalg.norm(to, axis=0)
+    step = rays.rays(x + 0.5, y) - rays.rays(x - 0.5, y)
+    pixel = np.linalg.norm(step, axis=0) / np.linalg.norm(rays.rays(x, y), axis=0)
+    off = np.linalg.norm(way - to, axis=0) / pixel
+    assert off[moved].max() < 0.05
+
+
+def test_what_rests_before_a_curved_facet_does_not_move_at_all(tmp_path):
+    write_tiny_job(tmp_path)
+    (tmp_path / "display.yaml").write_text(
+        "quilt_display: 1\nsurfaces:\n- {kind: sphere, radius: 0.9, pixels: [128, 64]}\n"
+    )
+    replaced(tmp_path, "job.yaml", "frames: 1-4", "frames: 1-4\noutput: {channels: [motion, Z]}")
+    _, buffers, _ = drawn(set_stage(load_job(tmp_path / "job.yaml")), 4)
+    assert np.isfinite(buffers["Z"]).any()
+    assert not buffers["motion.X"].any()
+    assert not buffers["motion.Y"].any()

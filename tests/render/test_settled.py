@@ -53,10 +53,10 @@ SCENES = {
 }
 
 
-def drawn(scene, samples, facets, eye, channels=("rgba", "cryptoobject", "diffuse", "specular")):
+def drawn(scene, samples, facets, eye, channels=("rgba", "cryptoobject", "diffuse", "specular"), **how):
     stage = stage_of_facets(facets, scene)
     update = {
-        "render": stage.job.render.model_copy(update={"samples": samples}),
+        "render": stage.job.render.model_copy(update={"samples": samples, **how}),
         "output": stage.job.output.model_copy(update={"channels": channels}),
     }
     stage = replace(stage, job=stage.job.model_copy(update=update))
@@ -136,3 +136,36 @@ def test_most_of_a_plain_floor_is_looked_at_once(settled):
     drawn(scene, 4, panel(density=200), eye)
     shown = np.count_nonzero(np.isfinite(drawn(scene, 1, panel(density=200), eye, ("Z",))["Z"])) / 64
     assert sum(settled) > 0.8 * shown
+
+
+def glinting_floor(roughness=0.3):
+    """A floor that mirrors a lamp as a small glint."""
+    scene = tiled_floor(1)
+    material = replace(scene.materials, roughness=np.full(1, roughness, np.float32))
+    return replace(scene, materials=material, lights=lights(point=[(0.1, 0.9, -2.9)], power=[(20, 20, 20)]))
+
+
+def test_every_sample_is_shaded_where_a_job_asks_for_that(settled):
+    """Where light is smooth nothing changes; what light's edges lose by one look a pixel is won back."""
+    eye, facets = viewer((0, 1.2, 2.5)), panel(density=120)
+    smooth = tiled_floor(2)
+    smooth = replace(smooth, lights=lights(ambient=(0.3, 0.2, 0.1)))
+    once = drawn(smooth, 16, facets, eye)
+    assert sum(settled) > 10
+    settled.clear()
+    each = drawn(smooth, 16, facets, eye, sample_shading=True)
+    assert not settled, "nothing may be looked at once"
+    for layer in ("R", "G", "B", "A"):
+        np.testing.assert_array_equal(once[layer], each[layer], err_msg=layer)
+    # A glint: most of it changes within pixels.
+    scene = glinting_floor()
+    truth = drawn(scene, 144, facets, eye, sample_shading=True)["specular.G"].astype(float)
+    once, each = (
+        drawn(scene, 16, facets, eye, sample_shading=asked)["specular.G"].astype(float)
+        for asked in (False, True)
+    )
+    assert truth.max() > 4
+    other = once != each
+    assert other.sum() > 100
+    errors = [np.sqrt(np.mean((found - truth)[other] ** 2)) for found in (once, each)]
+    assert errors[1] < 0.5 * errors[0]

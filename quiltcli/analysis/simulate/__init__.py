@@ -15,11 +15,12 @@ import numpy as np
 from quiltcli.analysis.simulate.compare import Comparison, compare, figures, heat_map, heat_scale, seam_pixels
 from quiltcli.analysis.simulate.images import shown_images
 from quiltcli.analysis.simulate.lookup import Shown
+from quiltcli.analysis.simulate.overlaps import all_light
 from quiltcli.analysis.simulate.picture import (
     direct_light,
-    displayed_light,
+    first_triangles,
     outlined,
-    visible_triangles,
+    seen_from,
     with_channels,
 )
 from quiltcli.analysis.simulate.reference import resampled_light
@@ -30,10 +31,12 @@ from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.images.preview import block_means
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.projection.camera import aimed, camera_display, frame_display
+from quiltcli.render.corrections import corrects
 from quiltcli.render.crew import default_threads
 from quiltcli.render.notices import stage_warnings
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.render.unseen import unseen_in
+from quiltcli.scene.bare import bare_scene
 from quiltcli.viewer.view import views_of
 from quiltcli.viewer.viewer import Viewer
 
@@ -67,6 +70,7 @@ class PictureOptions:
         edges: draw a line along the edges of the facets; what is compared is the picture without.
         threads: batches drawn at a time; 0 takes every core.
         eye: `left` or `right` of two eyes; empty for both.
+        corrected: whether images make up for the panels, as far as the job wants that.
     """
 
     size: tuple[int, int] = (1200, 900)
@@ -82,6 +86,7 @@ class PictureOptions:
     edges: bool = False
     threads: int = 0
     eye: str = ""
+    corrected: bool = True
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,9 @@ def simulate(
         QuiltError: bad input, or images that cannot be read.
     """
     options = options or PictureOptions()
+    if not options.corrected:
+        update = {"render": job.render.model_copy(update={"corrections": False})}
+        job = job.model_copy(update=update)
     views_of(job, frames)  # what is wrong with the path is said before anything is loaded
     sha = job_sha256(job)
     stage = set_stage(with_channels(job, ("rgba",)))
@@ -151,21 +159,29 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     width, height = (options.samples * side for side in options.size)
     through = camera_display(camera, width, height, fov)
     threads = options.threads or default_threads()
-    triangle = visible_triangles(stage, camera, through, threads, skin)
+    bare = bare_scene(skin.vertices, skin.triangles)
+    triangle, depth = first_triangles(stage, camera, through, bare, threads)
     facet = skin.facet_of(triangle)
-    light, lit = displayed_light(shown, camera, through, facet, options.filter, skin, triangle)
+    seen = seen_from(stage, shown, camera.eye, threads)
+    light, lit = all_light(
+        stage, seen, camera, through, facet, options.filter, skin, triangle, depth, threads
+    )
     picture = plain = block_means(_image(light, width), options.samples)
     if options.edges:
         picture = block_means(_image(outlined(light, facet, width), width), options.samples)
     if options.place is not None or not options.compare:
         return Simulation(viewer.frame, picture, None, None, "")
-    direct = block_means(_image(direct_light(stage, viewer, through, threads), width), options.samples)
+    # A display that is to show a share of its light is held against that share of the scene's.
+    response = corrects(stage)
+    level = np.float32(1.0 if response is None else response.level)
+    whole = direct_light(stage, viewer, through, threads)
+    direct = block_means(_image(level * whole, width), options.samples)
     on_lit = np.where(lit, facet, -1).reshape(height, width).astype(np.int32)
     covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
     coarse = None
     if options.resampled and not stage.facets.charts:
         coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads, options.filter)
-    once = None if coarse is None else block_means(_image(coarse, width), options.samples)
+    once = None if coarse is None else block_means(_image(level * coarse, width), options.samples)
     comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples), once)
     return Simulation(viewer.frame, picture, direct, comparison, "")
 
@@ -181,8 +197,9 @@ def _third_person(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOp
     width, height = (options.samples * side for side in options.size)
     through = camera_display(camera, width, height, options.fov or fov)
     threads = options.threads or default_threads()
+    seen = seen_from(stage, shown, camera.eye, threads)
     light, facet = third_person_light(
-        stage, viewer, shown, camera, through, options.filter, options.scene, threads
+        stage, viewer, seen, camera, through, options.filter, options.scene, threads
     )
     if options.edges:
         light = outlined(light, facet, width)

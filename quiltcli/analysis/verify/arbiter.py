@@ -6,15 +6,22 @@ question all triangles that were named, and all that share a corner with them, a
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
 import numpy as np
+from numpy.typing import NDArray
 
 from quiltcli.analysis.verify.tolerances import BESIDE, CLOSE, depth_tolerance
 from quiltcli.geometry import BoolArray, FloatArray, IntArray
+from quiltcli.shading.along import ABSENT, THERE
 from quiltcli.visibility.rays.embree import Target
 from quiltcli.visibility.rays.exact import Neighbours, Tests, intersect
 from quiltcli.visibility.rays.pixels import Places
 
 FAULT, IMPRECISE, CLOSE_BY = 0, 1, 2
+Presence: TypeAlias = Callable[[Places, IntArray, IntArray], NDArray[np.uint8]]
 
 
 def judge(
@@ -24,6 +31,7 @@ def judge(
     named: IntArray,
     drawn: IntArray,
     z: FloatArray,
+    presence: Presence | None = None,
 ) -> tuple[IntArray, IntArray]:
     """Who is right in some pixels.
 
@@ -34,6 +42,8 @@ def judge(
         named: (k, N) triangles named by rays, negative for none.
         drawn: (N,) triangle that was drawn, −1 where it is not known or there is none.
         z: (N,) depth that was drawn, infinite where nothing was.
+        presence: tells of pixels, rows of them (M,) and triangles (M,) whether these are ABSENT, THERE or
+            DOUBTFUL there; by default they are there.
 
     Returns:
         (N,) FAULT, IMPRECISE where the render is right, or CLOSE_BY where it shows one of two
@@ -45,11 +55,16 @@ def judge(
     covered = np.isfinite(z)
     if not tests.row.size:
         return np.where(covered, FAULT, IMPRECISE), np.full(z.size, -1)
+    sure = np.ones(tests.row.size, dtype=np.bool_)
+    if presence is not None:
+        there = presence(pixels, tests.row, tests.triangle)
+        tests = replace(tests, inside=np.where(there == ABSENT, -np.inf, tests.inside))
+        sure = there == THERE
     shown = _shown(tests, drawn, z)
     seen = shown >= 0
     depth = np.where(seen, tests.depth[shown], np.inf)
     distance = np.where(seen, tests.distance[shown], np.inf)
-    hidden = _hidden(tests, distance, shown)
+    hidden = _hidden(tests, distance, shown, sure)
     first = _at(tests, np.arange(z.size), named[0])
     close = seen & (first >= 0) & (first != shown)
     close &= np.abs(distance - tests.distance[first]) <= CLOSE * np.where(seen, distance, 1.0)
@@ -77,12 +92,13 @@ def _shown(tests: Tests, drawn: IntArray, z: FloatArray) -> IntArray:
     return result
 
 
-def _hidden(tests: Tests, distance: FloatArray, shown: IntArray) -> BoolArray:
-    """Pixels (N,) whose ray meets a surface nearer than `distance` (N,).
+def _hidden(tests: Tests, distance: FloatArray, shown: IntArray, sure: BoolArray) -> BoolArray:
+    """Pixels (N,) whose ray meets a surface nearer than `distance` (N,) that is `sure` (M,) to be there.
 
     A centre inside one triangle meets it; so does one on the edges of two, where they join.
     """
     nearer = tests.distance < distance[tests.row] * (1 - CLOSE)
+    nearer &= sure
     nearer &= shown[tests.row] != np.arange(tests.row.size)
     surely = np.bincount(tests.row, weights=nearer & (tests.inside > BESIDE), minlength=distance.size)
     on_edge = np.bincount(

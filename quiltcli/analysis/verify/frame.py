@@ -237,7 +237,7 @@ def make_trial(stage: Stage, viewer: Viewer, images: Images) -> Trial:
     rays = viewer_rays(stage.layout, stage.facets, their_lit_facets(stage.facets, viewer), viewer)
     target = target_of(stage, viewer)
     neighbours = Neighbours(scene.vertices, scene.triangles)
-    return Trial(stage.layout, stage.owners, rays, target, neighbours, images)
+    return Trial(stage.layout, stage.owners, rays, target, neighbours, images, scene)
 
 
 def _shown_outside(stage: Stage, viewers: Sequence[Viewer], images: Images) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
@@ -16,7 +16,9 @@ from quiltcli.analysis.verify.tolerances import depth_tolerance
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, OwnerArray
 from quiltcli.layout import Layout
 from quiltcli.projection.planar import QuiltRays
-from quiltcli.visibility.rays.embree import MISS, Target, cast, plane_depth, plane_distance
+from quiltcli.scene import Scene
+from quiltcli.shading.along import cast_on, presence
+from quiltcli.visibility.rays.embree import MISS, Target, plane_depth, plane_distance
 from quiltcli.visibility.rays.exact import Neighbours
 from quiltcli.visibility.rays.pixels import OFFSETS, Places, places
 
@@ -34,6 +36,7 @@ class Trial:
         target: the scene from the eye.
         neighbours: which of its triangles touch.
         images: what is verified.
+        scene: the scene.
     """
 
     layout: Layout
@@ -42,6 +45,11 @@ class Trial:
     target: Target
     neighbours: Neighbours
     images: Images
+    scene: Scene
+
+    def presence(self, pixels: Places, row: IntArray, triangle: IntArray) -> NDArray[np.uint8]:
+        """Whether triangles (M,) are there at the centres of pixels `row` (M,); see `along.presence`."""
+        return presence(self.scene, self.target, pixels.take(row), triangle)
 
 
 @dataclass(frozen=True)
@@ -100,9 +108,8 @@ class Sighting:
 
     def take(self, rows: IntArray) -> Sighting:
         """The sighting of some of the pixels."""
-        values = {f.name: getattr(self.pixels, f.name)[rows] for f in fields(Places)}
         return Sighting(
-            Places(**values),
+            self.pixels.take(rows),
             self.named[:, rows],
             self.z[rows],
             self.drawn[rows],
@@ -114,12 +121,12 @@ class Sighting:
 def sight(trial: Trial, address: IntArray) -> Sighting:
     """Cast the five rays of the pixels at `address` (P,), and look at the images there."""
     pixels = places(address, trial.layout, trial.owners, trial.rays)
-    named = np.stack([cast(trial.target, pixels.directions(*offset)) for offset in OFFSETS])
+    named = np.stack([cast_on(trial.scene, trial.target, pixels, offset) for offset in OFFSETS])
     centre = pixels.directions()
     plane = np.full(named.shape, np.inf)
     for k, row in enumerate(named):
         hit = np.flatnonzero(row >= 0)
-        plane[k, hit] = plane_depth(trial.target, row[hit], centre[hit])
+        plane[k, hit] = plane_depth(trial.target, row[hit], centre[hit], pixels.from_eye(hit))
     drawn = trial.images.triangle(address)
     z = trial.images.depth(address)
     unknown = np.full(address.size, -1)
@@ -170,17 +177,17 @@ def _faults(trial: Trial, seen: Sighting) -> tuple[Kinds, IntArray, IntArray]:
         some = seen.take(rows)
         centre = some.pixels.directions()
         start = np.where(some.named[0] >= 0, _distance(trial.target, some, centre), 0.0)
-        behind = cast(trial.target, centre, start * (1 + 1e-6))
+        behind = cast_on(trial.scene, trial.target, some.pixels, beyond=start * (1 + 1e-6))
         named = np.concatenate((some.named, behind[None]))
         verdict[rows], shown[rows] = judge(
-            trial.target, trial.neighbours, some.pixels, named, some.drawn, some.z
+            trial.target, trial.neighbours, some.pixels, named, some.drawn, some.z, trial.presence
         )
     return kind, verdict, shown
 
 
 def _distance(target: Target, some: Sighting, centre: FloatArray) -> FloatArray:
     """Distance (P,) along unit rays to the first hit's plane; 0 where that is nowhere."""
-    distance = plane_distance(target, np.maximum(some.named[0], 0), centre)
+    distance = plane_distance(target, np.maximum(some.named[0], 0), centre, some.pixels.origin)
     return np.where(np.isfinite(distance) & (distance > 0), distance, 0.0)
 
 

@@ -11,20 +11,19 @@ from typing import TypeAlias
 
 import numpy as np
 
-from quiltcli.display import demand_flat
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.exchange.elsewhere import Made, MadeOptions, prepare_made, write_made
 from quiltcli.exchange.project.lenses import WORLD, Lens
 from quiltcli.exchange.project.master import Master, loaded
+from quiltcli.exchange.project.sights import Rays, facet_rays, shown_pixels
 from quiltcli.exchange.project.stmap import write_st_maps
 from quiltcli.exchange.project.texels import Texels
 from quiltcli.exchange.project.tiles import TILE, Window, tile_light
 from quiltcli.formats.films import film_pictures
 from quiltcli.formats.inputs import is_regular
-from quiltcli.geometry import FloatArray, IntArray
+from quiltcli.geometry import IntArray
 from quiltcli.images.facets import page_of, surroundings
 from quiltcli.job import JobFile
-from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.report import FrameRecord
@@ -41,7 +40,6 @@ class Projected:
     """What is common to all tiles of a view."""
 
     stage: Stage
-    lens: Lens
     texels: Texels
     buffers: Buffers
 
@@ -73,7 +71,6 @@ def project(
     if master.stereo and not job.is_stereo:
         raise JobError("--stereo is for two eyes (the job has one; viewer.stereo gives it two)")
     ready = prepare_made(job, options, f"project {master.kind}")
-    demand_flat(ready.stage.facets, "quilt project")
     raise_all(OutputError, _missing(ready, master))
     threads = options.threads or default_threads()
     with ThreadPoolExecutor(threads) as pool:
@@ -120,10 +117,8 @@ def _fill(
 ) -> Made:
     """Fill the buffers of a view."""
     lens, texels = _lookup(master, kept, view)
-    # Rays along the lens's own axes need not be turned to them pixel by pixel.
-    axes, lens = lens.axes, replace(lens, axes=WORLD)
-    task = Projected(stage, lens, texels, buffers)
-    shown = list(pool.map(lambda band: _band(task, *band), list(_bands(stage, view, axes))))
+    task = Projected(stage, texels, buffers)
+    shown = list(pool.map(lambda band: _band(task, *band), list(_bands(stage, view, lens))))
     whole, seen = sum(pixels for pixels, _ in shown), sum(count for _, count in shown)
     dark = 1 - seen / whole if whole else 0.0
     warnings = [f"the picture does not show {dark:.1%} of the lit facets' pixels"] if dark > 0.0005 else []
@@ -153,18 +148,25 @@ def _lookup(master: Master, kept: Kept, view: View) -> tuple[Lens, Texels]:
     return master.lens(view, kept[key].size), kept[key]
 
 
-def _bands(stage: Stage, view: View, axes: FloatArray) -> Iterator[tuple[int, Window, FloatArray]]:
-    """Rows of tiles on the pages: the facet's row in the layout, a window, and its rays along some axes."""
+def _bands(stage: Stage, view: View, lens: Lens) -> Iterator[tuple[int, Window, Rays, Lens]]:
+    """Rows of tiles on the pages: the facet's row in the layout, a window, its rays and the lens for them.
+
+    Rays of a flat facet are turned to the lens's own axes once, and not pixel by pixel.
+    """
+    local = replace(lens, axes=WORLD)
     for viewer in view.viewers:
         lit = their_lit_facets(stage.facets, viewer) & (stage.layout.page >= 0)
-        rays = eye_from_quilt(stage.layout, viewer.eye)
+        rays = facet_rays(stage, viewer)
         for row in np.flatnonzero(lit).tolist():
+            own, its = rays[row], lens
+            if isinstance(own, np.ndarray):
+                own, its = lens.axes @ own, local
             whole = Window(*surroundings(stage.layout, row, stage.job.render.bleed + 1))
             for band in whole.tiles(whole.x1 - whole.x0, TILE[1]):
-                yield row, band, axes @ rays[row]
+                yield row, band, own, its
 
 
-def _band(task: Projected, row: int, band: Window, rays: FloatArray) -> tuple[int, int]:
+def _band(task: Projected, row: int, band: Window, rays: Rays, lens: Lens) -> tuple[int, int]:
     """Fill a row of tiles; the facet's pixels in it, and how many of them show the picture."""
     layout = task.stage.layout
     page, facet = int(layout.page[row]), layout.facet[row]
@@ -176,9 +178,12 @@ def _band(task: Projected, row: int, band: Window, rays: FloatArray) -> tuple[in
         owner: IntArray = owners[spot]
         inside = owner == facet
         mine = inside | (owner == -facet)
+        shown = shown_pixels(rays, *tile.centres())
+        if shown is not None:
+            inside, mine = inside & shown, mine & shown
         if not mine.any():
             continue
-        values = tile_light(tile, rays, task.lens, task.texels).astype(np.float16)
+        values = tile_light(tile, rays, lens, task.texels).astype(np.float16)
         for c, channel in enumerate(channels):
             np.copyto(channel[spot], values[..., c], where=mine)
         pixels += int(np.count_nonzero(inside))

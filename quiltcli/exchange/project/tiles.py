@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.exchange.project.lenses import Lens, Place, Steps
+from quiltcli.exchange.project.sights import Rays, directions_at, moved, slopes_at
 from quiltcli.exchange.project.texels import Texels
 from quiltcli.geometry import Float32Array, FloatArray
 
@@ -47,6 +48,11 @@ class Window:
         """Width and height."""
         return self.x1 - self.x0, self.y1 - self.y0
 
+    def centres(self) -> tuple[FloatArray, FloatArray]:
+        """Centres of its pixels: (w,) across and (h, 1) down."""
+        x, y = (np.arange(a, b, dtype=np.float64) for a, b in ((self.x0, self.x1), (self.y0, self.y1)))
+        return x + 0.5, y[:, None] + 0.5
+
     def tiles(self, across: int, down: int) -> Iterator[Window]:
         """Windows of at most so many pixels that make it up."""
         for y in range(self.y0, self.y1, down):
@@ -54,12 +60,12 @@ class Window:
                 yield Window(x, y, min(x + across, self.x1), min(y + down, self.y1))
 
 
-def tile_light(window: Window, rays: FloatArray, lens: Lens, texels: Texels) -> Float32Array:
+def tile_light(window: Window, rays: Rays, lens: Lens, texels: Texels) -> Float32Array:
     """Light (h, w, 4) of a window's pixels, premultiplied; alpha is the share that the picture shows.
 
     Args:
         window: pixels of a page.
-        rays: (3, 3) page pixel (x, y, 1) → direction from the eye.
+        rays: page pixel → direction from the eye.
         lens: where directions lie in the picture.
         texels: the picture.
     """
@@ -81,32 +87,27 @@ def tile_light(window: Window, rays: FloatArray, lens: Lens, texels: Texels) -> 
         if not place.inside.all():
             light *= place.inside[:, None]
     else:
-        light = _boxed(rays, lens, texels, d, (nx, ny), turned=turned)
+        light = _boxed(window, rays, lens, texels, d, (nx, ny), turned=turned)
     return light.reshape(height, width, 4)
 
 
-def directions(window: Window, rays: FloatArray) -> FloatArray:
+def directions(window: Window, rays: Rays) -> FloatArray:
     """Directions (3, h, w) of the pixels' centres."""
-    x = np.arange(window.x0, window.x1) + 0.5
-    y = np.arange(window.y0, window.y1)[:, None] + 0.5
-    d = np.empty((3, y.size, x.size))
-    for k, row in enumerate(rays):
-        np.add(row[0] * x + row[2], row[1] * y, out=d[k])
-    return d
+    return directions_at(rays, *window.centres())
 
 
-def _counts(window: Window, rays: FloatArray, lens: Lens) -> tuple[int, int, bool]:
+def _counts(window: Window, rays: Rays, lens: Lens) -> tuple[int, int, bool]:
     """Samples across and down for the longest steps in texels at 5 × 5 places over a window.
 
     And whether they are along the axes of the pixels' ellipses, where that takes fewer.
     """
     x = np.linspace(window.x0 + 0.5, window.x1 - 0.5, 5)
     y = np.linspace(window.y0 + 0.5, window.y1 - 0.5, 5)[:, None]
-    d = np.stack([row[0] * x + row[1] * y + row[2] for row in rays])
+    d = directions_at(rays, x, y)
     inside = lens.place(d).inside
     if not inside.any():
         inside[:] = True  # only a corner of the picture lies between these places
-    across, down = (lens.steps(d, rays[:, k]) for k in (0, 1))
+    across, down = (lens.steps(d, slope) for slope in slopes_at(rays, x, y))
     sides = [_samples(float(np.hypot(step.x, step.y)[inside].max())) for step in (across, down)]
     _, long, short = _ellipses(across, down)
     axes = [_samples(float(np.sqrt(axis[inside].max()))) for axis in (long, short)]
@@ -130,18 +131,19 @@ def _samples(side: float) -> int:
     return int(np.clip(np.ceil(side / np.sqrt(_TENT2) - 1e-6), 1, MOST)) if np.isfinite(side) else MOST
 
 
-def _blur(window: Window, rays: FloatArray, lens: Lens) -> tuple[float, float]:
+def _blur(window: Window, rays: Rays, lens: Lens) -> tuple[float, float]:
     """B of the cubics across and down the picture, for the middle of a window."""
-    middle = np.array([(window.x0 + window.x1) / 2, (window.y0 + window.y1) / 2, 1.0])
-    d = np.stack([row[0] * middle[0] + row[1] * middle[1] + row[2] for row in rays])[:, None]
-    across, down = (lens.steps(d, rays[:, k]) for k in (0, 1))
+    x, y = np.array([(window.x0 + window.x1) / 2]), np.array([(window.y0 + window.y1) / 2])
+    d = directions_at(rays, x, y)
+    across, down = (lens.steps(d, slope) for slope in slopes_at(rays, x, y))
     sizes = (np.hypot(across.x, down.x)[0], np.hypot(across.y, down.y)[0])
-    x, y = (float(np.clip((size * size - 1) / 2, 0, 0.5)) for size in sizes)
-    return x, y
+    blur = [float(np.clip((size * size - 1) / 2, 0, 0.5)) for size in sizes]
+    return blur[0], blur[1]
 
 
 def _boxed(
-    rays: FloatArray,
+    window: Window,
+    rays: Rays,
     lens: Lens,
     texels: Texels,
     d: FloatArray,
@@ -150,7 +152,8 @@ def _boxed(
     turned: bool,
 ) -> Float32Array:
     """Mean light (P, 4) of samples over the pixels' boxes, with sides along the page, or turned."""
-    across, down = (lens.steps(d, rays[:, k]) for k in (0, 1))
+    slopes = slopes_at(rays, *window.centres())
+    across, down = (lens.steps(d, slope) for slope in slopes)
     cos = sin = across.x
     if turned:
         angle, *squares = _ellipses(across, down)
@@ -164,8 +167,7 @@ def _boxed(
         for i in range(count[0]):
             first = ((i + 0.5) / count[0] - 0.5) * spread[0]
             x, y = (first * cos - second * sin, first * sin + second * cos) if turned else (first, second)
-            moved = d + rays[:, 0, None, None] * x + rays[:, 1, None, None] * y
-            place = lens.place(moved.reshape(3, -1))
+            place = lens.place(moved(d, slopes, x, y).reshape(3, -1))
             one = texels.linear(place)
             if not place.inside.all():
                 one *= place.inside[:, None]
@@ -174,6 +176,6 @@ def _boxed(
     return light
 
 
-def places(window: Window, rays: FloatArray, lens: Lens) -> Place:
+def places(window: Window, rays: Rays, lens: Lens) -> Place:
     """Where the centres of a window's pixels lie in the picture, (h, w)."""
     return lens.place(directions(window, rays))

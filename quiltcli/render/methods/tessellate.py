@@ -23,7 +23,7 @@ from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.buffers import Buffers, clear, lay_background, new_buffers
 from quiltcli.render.frame import draw_frame
-from quiltcli.render.methods.raycast import barycentric, pixels_of, weight_slopes
+from quiltcli.render.methods.raycast import pixels_of
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene.bare import bare_scene
@@ -32,6 +32,7 @@ from quiltcli.shading.aovs import fill
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.rays.embree import aim, embree_scene, measure_along
 from quiltcli.visibility.rays.pixels import lit_pixels, places
+from quiltcli.visibility.rays.weights import barycentric, weight_slopes
 from quiltcli.visibility.resolve.hits import point_hits
 
 THRESHOLD = 0.01

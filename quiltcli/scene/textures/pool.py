@@ -58,6 +58,7 @@ class Sheet:
     picture: Picture
     srgb: bool
     wrap: tuple[str, str]
+    opaque: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +164,8 @@ class TextureStore:
 
 def sheet_of(texture: Texture) -> Sheet:
     """The texels that a texture is looked up in."""
-    return Sheet(texture.picture, texture.role in IN_SRGB, texture.wrap)
+    srgb = texture.role in IN_SRGB and not texture.raw
+    return Sheet(texture.picture, srgb, texture.wrap, texture.opaque)
 
 
 def check_textures(textures: Iterable[Texture], limits: TextureLimits | None = None) -> None:
@@ -255,6 +257,8 @@ def _write(
 ) -> None:
     """Write a picture's levels of some sizes into the pool, each with its border."""
     pixels = sheet.picture.pixels(texture.use)
+    if sheet.opaque and pixels.shape[2] in (2, 4):
+        pixels = pixels[..., :-1]
     srgb = sheet.srgb and pixels.dtype.kind == "u"
     row = 0
     for level in levels_of(pixels, srgb=srgb):

@@ -35,12 +35,16 @@ class Blockers:
         embree: Embree's scene of them.
         above: (T,) how far above each triangle of the scene rays start, metres.
         bent: (T,) triangles whose corners have normals of their own.
+        soft: Embree's scene of those that light may pass; None where there are none.
+        soft_triangles: (K,) the triangle each of these is.
     """
 
     middle: FloatArray
     embree: Any
     above: FloatArray
     bent: BoolArray
+    soft: Any = None
+    soft_triangles: IntArray | None = None
 
     def hide(self, origin: FloatArray, direction: Float32Array, far: float) -> BoolArray:
         """Whether something lies on the way of rays.
@@ -58,6 +62,19 @@ class Blockers:
             way = np.ascontiguousarray(np.broadcast_to(way.T, start.shape), dtype=np.float32)
             found[part] = is_hidden(self.embree, start, way, np.full(len(start), far, dtype=np.float32))
         return found
+
+    def meet_soft(self, origin: FloatArray, direction: FloatArray, far: FloatArray) -> IntArray:
+        """The first triangles (N,) that light may pass on the way of rays, −1 for none.
+
+        Args:
+            origin: (N, 3) where they start, minus `middle`, metres.
+            direction: (N, 3) where they go, of any length.
+            far: (N,) multiples of it at which they end.
+        """
+        assert self.soft_triangles is not None
+        rays = origin.astype(np.float32), direction.astype(np.float32)
+        met = self.soft.run(*rays, dists=far.astype(np.float32)).astype(np.int64)
+        return np.where(met >= 0, self.soft_triangles.take(np.maximum(met, 0)), -1)
 
 
 _making = threading.Lock()
@@ -92,10 +109,14 @@ def _made(scene: Scene) -> Blockers:
     cast = np.ones(len(scene.objects), dtype=np.bool_)
     cast[list(scene.lets_light_by)] = False
     blocks = cast.take(scene.object)
-    for passed in (scene.soft, scene.invisible):  # what light may pass is not asked how much
-        if passed is not None:
-            blocks &= ~passed
+    if scene.invisible is not None:
+        blocks &= ~scene.invisible
+    soft, named = None, None
+    if scene.soft is not None and (blocks & scene.soft).any():
+        named = np.flatnonzero(blocks & scene.soft)
+        soft = embree_scene(corners, triangles.take(named, axis=0))
+        blocks &= ~scene.soft
     chosen: IntArray = np.flatnonzero(blocks)
     shown = triangles if chosen.size == len(triangles) else triangles.take(chosen, axis=0)
     bent = np.asarray(scene.corner_normals[:, 3:9].any(axis=1))
-    return Blockers(middle, embree_scene(corners, shown), far * ABOVE, bent)
+    return Blockers(middle, embree_scene(corners, shown), far * ABOVE, bent, soft, named)

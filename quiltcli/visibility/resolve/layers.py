@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.geometry import BoolArray, IntArray, slices
+from quiltcli.visibility.resolve.displaced import rays_of
 from quiltcli.visibility.resolve.hits import Hits, single_places
 from quiltcli.visibility.resolve.pixels import pixel_hits
 from quiltcli.visibility.resolve.reader import Reader
 from quiltcli.visibility.resolve.tiles import tiles_at
 from quiltcli.visibility.scan.soft import Fragments
+from quiltcli.visibility.setup.samples import Samples
 
 _TILES = 1024  # microtiles whose pixels are read at a time
 
@@ -32,13 +34,16 @@ class LayerHits:
     inside: BoolArray
 
 
-def layer_hits(reader: Reader, fragments: Fragments, light: BoolArray) -> Iterator[LayerHits]:
+def layer_hits(
+    reader: Reader, fragments: Fragments, light: BoolArray, samples: Samples | None = None
+) -> Iterator[LayerHits]:
     """The hits of all layers, the nearest first.
 
     Args:
         reader: the canvas.
         fragments: those gathered of it.
         light: (n,) pixels that light still passes, kept up to date by whoever takes a layer.
+        samples: where the rays of patches go through; None of flat facets.
     """
     for row, keys in fragments.layers(light):
         order = np.argsort(row, kind="stable")
@@ -48,10 +53,12 @@ def layer_hits(reader: Reader, fragments: Fragments, light: BoolArray) -> Iterat
         for part in slices(0, first.size, _TILES):
             begin = int(first[part.start])
             end = int(first[part.stop]) if part.stop < first.size else row.size
-            yield _read(reader, fragments, row[begin:end], keys[begin:end])
+            yield _read(reader, fragments, row[begin:end], keys[begin:end], samples)
 
 
-def _read(reader: Reader, fragments: Fragments, row: IntArray, keys: IntArray) -> LayerHits:
+def _read(
+    reader: Reader, fragments: Fragments, row: IntArray, keys: IntArray, samples: Samples | None
+) -> LayerHits:
     """Hits of pixels in ascending order."""
     address = fragments.pixel.take(row)
     index, which = np.unique(address >> 6, return_inverse=True)
@@ -61,5 +68,8 @@ def _read(reader: Reader, fragments: Fragments, row: IntArray, keys: IntArray) -
     inside = bits[which, place]
     quilt = tiles.address[which] + tiles.stride[which] * (place >> 3) + (place & 7)
     count = int(np.count_nonzero(inside))
-    hits = pixel_hits(reader, tiles, keys, which * 64 + place, single_places(quilt), count)
+    pixel, known = which * 64 + place, None
+    if samples is not None:
+        known = rays_of(reader, samples, tiles, pixel)
+    hits = pixel_hits(reader, tiles, keys, pixel, single_places(quilt), count, known)
     return LayerHits(row, hits, inside)

@@ -12,7 +12,8 @@ from quiltcli.geometry import FloatArray, IntArray, offsets, segments, slices
 from quiltcli.visibility.scan.depth import DepthRange
 from quiltcli.visibility.scan.keys import make_keys, serial_part
 from quiltcli.visibility.scan.large import covering_keys, not_behind, rounds
-from quiltcli.visibility.scan.spans import Spans, held
+from quiltcli.visibility.scan.soft import Fragments, taken_over, together
+from quiltcli.visibility.scan.spans import MICROTILE, Spans, held
 from quiltcli.visibility.setup.blocks import Canvas, least_keys
 from quiltcli.visibility.setup.planes import Planes, facing
 from quiltcli.visibility.setup.samples import Samples
@@ -47,6 +48,28 @@ def draw_displaced(planes: Planes, canvas: Canvas, samples: Samples, limits: Dep
     keys = canvas.keys[touched]
     keys[~samples.lit[touched]] = 0
     canvas.keys[touched] = keys
+
+
+def displaced_fragments(
+    planes: Planes, canvas: Canvas, samples: Samples, limits: DepthRange, bits: int
+) -> Fragments | None:
+    """Gather the fragments of pairs that light may pass; see `soft.soft_fragments`.
+
+    Args:
+        planes: the pairs.
+        canvas: everything opaque; its `owned` pixels are lit.
+        samples: the canvas's.
+        limits: near and far, for pairs that reach beyond them.
+        bits: bits of the serial in a key.
+    """
+    spans, found = displaced_spans(planes, canvas, samples), []
+    for part in slices(0, spans.row.size, _ROUND):
+        few = spans[part]
+        keys = _tile_keys(planes, few, samples, limits, bits)
+        seen = np.flatnonzero(keys > np.maximum(canvas.keys.take(few.tile, axis=0), 0))
+        tile, place = np.divmod(seen, MICROTILE * MICROTILE)
+        found.append((few.tile.take(tile) * 64 + place, keys.reshape(-1).take(seen)))
+    return taken_over(canvas, *together(found))
 
 
 def displaced_spans(planes: Planes, canvas: Canvas, samples: Samples) -> Spans:
@@ -131,7 +154,8 @@ def _tile_keys(planes: Planes, spans: Spans, samples: Samples, limits: DepthRang
         table[:, k] = np.take(plane, row, axis=1).T
     points = samples.points.take(spans.tile, axis=0)
     # Every product and sum is exact on these grids: the same in any order.
-    values = table @ points
+    values = table[:, :, :2] @ points
+    values += table[:, :, 2:]
     inverse = np.ascontiguousarray(values[:, 0])
     np.maximum(inverse, planes.low.take(row)[:, None], out=inverse)
     np.minimum(inverse, planes.high.take(row)[:, None], out=inverse)

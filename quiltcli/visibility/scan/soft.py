@@ -7,7 +7,7 @@ canvas's or the list's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from quiltcli.geometry import BoolArray, IntArray, slices
 from quiltcli.visibility.scan.depth import DepthRange
 from quiltcli.visibility.scan.large import tile_keys
 from quiltcli.visibility.scan.order import BatchOrder
-from quiltcli.visibility.scan.small import LIMIT, candidates_of
+from quiltcli.visibility.scan.small import LIMIT, Candidates, candidates_of
 from quiltcli.visibility.scan.spans import MICROTILE, Spans, large_spans
 from quiltcli.visibility.setup.blocks import Canvas
 from quiltcli.visibility.setup.planes import Planes, PlaneTable, Warped
@@ -84,9 +84,27 @@ def soft_fragments(
     found = list(candidates_of(pairs, rows[small], table, canvas, limits, bits, by))
     large = table.add(pairs, rows[~small]).compact()
     found += _large(large, large_spans(large, canvas, by, hide=False), canvas, limits, bits, by)
-    address = np.concatenate([np.zeros(0, dtype=np.int64), *(part for part, _ in found)])
-    keys = np.concatenate([np.zeros(0, dtype=np.int64), *(part for _, part in found)])
+    address, keys = together(found)
     _settle(np.unique(address >> 6), table, canvas, limits, bits)
+    return taken_over(canvas, address, keys)
+
+
+def together(found: Iterable[Candidates]) -> Candidates:
+    """All candidates in one."""
+    parts = list(found)
+    address = np.concatenate([np.zeros(0, dtype=np.int64), *(part for part, _ in parts)])
+    keys = np.concatenate([np.zeros(0, dtype=np.int64), *(part for _, part in parts)])
+    return address, keys
+
+
+def taken_over(canvas: Canvas, address: IntArray, keys: IntArray) -> Fragments | None:
+    """Fragments of candidates that lie before what is opaque, whose pixels leave the canvas; None if none do.
+
+    Args:
+        canvas: everything opaque, the candidates' microtiles with keys for each pixel.
+        address: (F,) pixels of candidates.
+        keys: (F,) their keys.
+    """
     opaque = canvas.keys.reshape(-1)
     front = (keys > opaque.take(address)) & _owned(canvas, address)
     if not front.any():
@@ -103,7 +121,7 @@ def soft_fragments(
 
 def _large(
     planes: Planes, spans: Spans, canvas: Canvas, limits: DepthRange, bits: int, by: BatchOrder | None
-) -> Iterator[tuple[IntArray, IntArray]]:
+) -> Iterator[Candidates]:
     """Addresses and keys of what large pairs cover."""
     for part in slices(0, spans.row.size, _ROUND):
         few = spans[part]
