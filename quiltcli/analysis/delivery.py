@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from quiltcli.errors import Problem
 from quiltcli.images.names import Names, names_of
@@ -139,6 +140,34 @@ def _one_image(what: Delivery) -> Iterator[Problem]:
         words = "both eyes are parts of one file, of which players read the first (expected stereo: files)"
         yield what.job.output.source.problem("stereo", words)
 
+
+def film_problems(codec: str, paths: Sequence[Path], target: str) -> list[Problem]:
+    """What keeps films, or folders of numbered pictures, from being played by a system.
+
+    Args:
+        codec: how they are coded.
+        paths: the films or folders.
+        target: a name of `TARGETS`.
+    """
+    taken, words = FILMS.get(target, ((), ""))
+    problems = [Problem(f"--codec {codec}: {words}")] if taken and codec not in taken else []
+    if _plain_words in TARGETS[target]:
+        for path in paths:
+            if found := _SPECIAL.search(path.stem):
+                told = f"its name holds {found[0]!r}, which disguise takes for a word of its own"
+                problems.append(Problem(told, file=str(path)))
+    return problems
+
+
+FILMS: dict[str, tuple[tuple[str, ...], str]] = {
+    "disguise": (
+        ("hap", "dxv", "prores", "dnxhr", "png", "tiff", "dpx"),
+        "disguise plays films whose frames stand alone (expected hap, dxv, prores, dnxhr or pictures)",
+    ),
+    "7thsense": (("dpx",), "7thSense plays sequences (expected dpx, or the EXR pages as they are)"),
+    "hap": (("hap",), "is no HAP (expected hap)"),
+}
+"""Codecs of films and pictures by system, as far as it cares, and what is said of others."""
 
 TARGETS: dict[str, tuple[Callable[[Delivery], Iterator[Problem]], ...]] = {
     "disguise": (_not_too_large, _plain_words, _one_image),

@@ -7,25 +7,20 @@ from pathlib import Path
 
 import click
 
-from quiltcli.cli.options import PATH
+from quiltcli.cli.options import PATH, PLAYER
 
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=PATH)
 @click.option("--strict", is_flag=True, help="Fail on what is only worth a second look, too.")
-@click.option(
-    "--for",
-    "target",
-    type=click.Choice(("disguise", "7thsense", "resolume", "hap")),
-    help="Hold a job's names and sizes against what those who play the images ask.",
-)
-def check(files: tuple[Path, ...], strict: bool, target: str | None) -> None:
+@PLAYER
+def check(files: tuple[Path, ...], strict: bool, target: str) -> None:
     """Read FILES strictly and report every problem found; what is only worth a second look goes to stderr."""
     from quiltcli.analysis.check import check_files
 
     notices: list[str] = []
     plans: list[str] = []
-    problems = check_files(files, notices.append, target or "", plans.append)
+    problems = check_files(files, notices.append, target, plans.append)
     for problem in problems:
         click.echo(str(problem))
     if problems:

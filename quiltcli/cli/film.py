@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, OVERWRITE, PATH, SIZE, frames_option, refuse_typed
+from quiltcli.cli.options import EXPOSURE, OVERWRITE, PATH, PLAYER, SIZE, frames_option, refuse_typed
 
 _CODECS = ("prores", "h264", "h265", "dnxhr", "hap", "dxv", "png", "tiff", "dpx")
 
@@ -35,6 +35,7 @@ _CODECS = ("prores", "h264", "h265", "dnxhr", "hap", "dxv", "png", "tiff", "dpx"
     "--bits", type=click.Choice(("8", "16")), default="8", show_default=True, help="Of PNG and TIFF."
 )
 @click.option("--size", type=SIZE, default="1920x1080", show_default=True, help="Of a simulation.")
+@PLAYER
 @OVERWRITE
 def film(
     out: Path,

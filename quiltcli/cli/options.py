@@ -211,6 +211,13 @@ MAP_FORMAT = Words(_map_formats)
 PATTERN = Words(_patterns)
 VIEW = click.Choice(("aces", "srgb"))
 STILL_VIEW = click.Choice(("aces", "srgb", "raw"))
+PLAYER = click.option(
+    "--for",
+    "target",
+    type=click.Choice(("disguise", "7thsense", "resolume", "hap")),
+    callback=lambda context, option, name: name or "",
+    help="Hold names, sizes and codecs against what those who play the images ask.",
+)
 THREADS = click.option("-j", "--threads", type=click.IntRange(min=1), help="Threads; every core by default.")
 SETS = click.option(
     "--set",

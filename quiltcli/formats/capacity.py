@@ -42,12 +42,14 @@ def limit_memory(most: int | None) -> None:
 def free_memory() -> int | None:
     """Bytes that this process may still take, None where nothing tells.
 
-    The least of what the system has available, what the control group leaves, what the limit of the
-    address space leaves (`ulimit -v`) and what `limit_memory` does.
+    The least of what the system has available, what the control group leaves and what the limit of the
+    address space leaves (`ulimit -v`), but for a reserve; and of what `limit_memory` does, as it is said.
     """
-    told = (_system(), _control_group(), _address_space(), _allowed())
-    known = [limit for limit in told if limit is not None]
-    return max(min(known) - _RESERVE, 0) if known else None
+    told = (_system(), _control_group(), _address_space())
+    known = [limit - _RESERVE for limit in told if limit is not None]
+    allowed = _allowed()
+    known += [] if allowed is None else [allowed]
+    return max(min(known), 0) if known else None
 
 
 def _allowed() -> int | None:

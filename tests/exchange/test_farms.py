@@ -135,7 +135,7 @@ def test_memory_may_be_limited(job, monkeypatch):
     assert capacity.read_bytes("1.5 GB") == 1_500_000_000
     assert capacity.read_bytes("512MiB") == 512 << 20
     assert capacity.read_bytes("1000") == 1000
-    code, said = quilt("render", job, "-f", "1", "--max-memory", "300MB")
+    code, said = quilt("render", job, "-f", "1", "--max-memory", "60MB")
     assert code == 2
     assert "of memory, but 0.1 MB are free" in said
     assert quilt("render", job, "-f", "1", "--max-memory", "64GB")[0] == 0

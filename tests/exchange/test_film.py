@@ -130,6 +130,30 @@ def test_dxv_takes_sizes_in_sixteens(tmp_path):
     assert not (tmp_path / "a.mov").exists()
 
 
+@pytest.mark.parametrize(
+    ("target", "codec", "name", "said"),
+    [
+        ("disguise", "h264", "a.mp4", r"--codec h264: disguise plays films whose frames stand alone"),
+        ("disguise", "hap", "a_v2.mov", r"a_v2\.mov: its name holds '_v', which disguise takes"),
+        ("disguise", "hap", "a_vault.mov", ""),
+        ("7thsense", "hap", "a.mov", r"--codec hap: 7thSense plays sequences \(expected dpx"),
+        ("7thsense", "dpx", "a_v2", ""),
+        ("hap", "dxv", "a.mov", r"--codec dxv: is no HAP"),
+        ("resolume", "dxv", "a.mov", ""),
+    ],
+)
+def test_players_take_some_codecs_and_names(tmp_path, target, codec, name, said):
+    pytest.importorskip("av")
+    put(tmp_path / "o/quilt/page_01.0001.exr", np.full((16, 32, 3), 0.5))
+    options = FilmOptions(codec=codec, target=target)
+    if said:
+        with pytest.raises(JobError, match=said):
+            make_film(tmp_path / "o", tmp_path / name, options)
+    else:
+        make_film(tmp_path / "o", tmp_path / name, options)
+    assert (tmp_path / name).exists() == (not said)
+
+
 def test_a_facet_that_was_left_out_is_black_and_told(out, tmp_path):
     said = []
     options = FilmOptions(subject="facets", codec="png")

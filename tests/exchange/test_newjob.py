@@ -21,6 +21,7 @@ from quiltcli.formats.drawing.shapes import Label
 from quiltcli.job import load_display_file
 from quiltcli.job.lengths import read_length
 from quiltcli.layout import read_layout
+from tests.helpers.gltf_files import one_square
 
 SMALL = {
     "corner": Wishes("corner", left="2x1m", right="1.5x1m", angle=90, pitch="50mm"),
@@ -135,6 +136,22 @@ def test_content_is_named_as_the_new_folder_sees_it(tmp_path: Path) -> None:
     (tmp_path / "thing.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     write_new_job(replace(SMALL["wall"], scene=str(tmp_path / "thing.obj")), tmp_path / "new")
     assert 'mesh: "../thing.obj"' in (tmp_path / "new" / "scene.yaml").read_text()
+
+
+@pytest.mark.parametrize("more", [False, True])
+def test_animations_and_lights_of_content_are_taken_along(tmp_path: Path, more: bool) -> None:
+    file = one_square()
+    if more:
+        file.animation(0, "translation", [0, 1], [[0, 0, 0], [0, 1, 0]])
+        file.json["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "directional"}]}}
+        file.node(extensions={"KHR_lights_punctual": {"light": 0}})
+    file.write(tmp_path / "thing.glb")
+    write_new_job(replace(SMALL["wall"], scene=str(tmp_path / "thing.glb")), tmp_path / "new")
+    text = (tmp_path / "new" / "scene.yaml").read_text()
+    assert ("animation: {}" in text, "{type: file}" in text, "directional" in text) == (more, more, not more)
+    notes: list[str] = []
+    assert check_files([tmp_path / "new" / "job.yaml"], notes.append) == []
+    assert not [note for note in notes if "animation" in note or "light" in note]
     assert not (tmp_path / "new" / "content.obj").exists()
     assert check_files([tmp_path / "new" / "job.yaml"]) == []
 

@@ -23,7 +23,7 @@ from quiltcli.exchange.project.lenses import (
 from quiltcli.exchange.project.master import Master
 from quiltcli.exchange.project.project import project
 from quiltcli.exchange.project.texels import cubic_weights, texels
-from quiltcli.exchange.project.tiles import TILE, Window, tile_light
+from quiltcli.exchange.project.tiles import TILE, Window, _counts, tile_light
 from quiltcli.formats.exr.image import read_exr, write_exr
 from quiltcli.images.names import facet_path, quilt_path
 from quiltcli.job import load_job
@@ -132,6 +132,52 @@ def test_derivatives_are_those_of_the_place(kind):
     for one, low, high in zip(found, (before.x, before.y), (after.x, after.y), strict=True):
         fits = np.abs((high - low) / (2 * eps) - one) < 1e-4 * (1 + np.abs(one))
         assert fits[np.abs(high - low) < 1].all()
+
+
+def test_waves_on_a_floor_below_a_panorama_are_averaged_over_pixels():
+    """At the pole steps along the page are many texels of longitude, whichever way; waves of 12 pixels."""
+    lens, size = Equirect(axes_of(0, 0), (4096, 2048)), 240
+    k = 2 * np.pi / 12 * size / 0.3  # radians for a length of 1 on the floor, of which 0.3 is seen
+
+    def waves(d):
+        x, z = d[0] / np.maximum(-d[1], 1e-3), d[2] / np.maximum(-d[1], 1e-3)
+        near = np.exp(-(((x * x + z * z) * 8) ** 2)) * (d[1] < 0)
+        light = 0.5 + 0.25 * near * (np.cos(k * x) + np.cos(k * (0.6 * x + 0.8 * z)))
+        return np.stack((light, light, light, np.ones_like(light)), axis=-1)
+
+    picture = texels(pictures_of(lens, waves), lens)
+    rays = np.array([[0.3 / size, 0, -0.15], [0, 0, -1.0], [0, 0.3 / size, -0.15]])
+    window = Window(0, 0, size, size)
+    assert _counts(Window(100, 100, 140, 140), rays, lens)[2]
+    light = np.concatenate(
+        [
+            np.concatenate([tile_light(tile, rays, lens, picture) for tile in band.tiles(60, 60)], axis=1)
+            for band in window.tiles(size, 60)
+        ]
+    )
+    fine = (np.arange(8 * size) + 0.5) / 8
+    d = np.stack([row[0] * fine + row[1] * fine[:, None] + row[2] for row in rays])
+    expected = waves(d).reshape(size, 8, size, 8, 4).mean(axis=(1, 3))
+    off = np.abs(light - expected)[..., 0]
+    assert off.max() < 0.03
+    assert np.sqrt((off * off).mean()) < 0.006
+
+
+def test_stripes_of_a_texel_are_grey_at_the_pole():
+    """Meridians of every other texel: pixels that span many of them average them, whichever way they lie."""
+    lens = Equirect(axes_of(0, 0), (1024, 512))
+    stripes = np.zeros((512, 1024, 4), np.float32)
+    stripes[:, ::2] = 1
+    size = 240
+    rays = np.array([[0.6 / size, 0, -0.3], [0, 0, -1.0], [0, 0.6 / size, -0.3]])
+    picture = texels([stripes], lens)
+    for x, y in ((125, 125), (125, 95), (95, 125), (136, 104)):
+        window = Window(x, y, x + 16, y + 16)
+        nx, ny, by_axes = _counts(window, rays, lens)
+        assert by_axes
+        assert nx > 3 * ny
+        light = tile_light(window, rays, lens, picture)[..., 0]
+        assert np.abs(light - 0.5).max() < 0.12
 
 
 def test_faces_are_upright_for_who_turns_to_them():

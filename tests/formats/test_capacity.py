@@ -59,3 +59,14 @@ def test_bytes_are_told_in_units_of_disks() -> None:
         "3.4 MB",
         "0.1 MB",
     ]
+
+
+def test_what_is_allowed_is_meant_as_said(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No reserve is taken from it, but what the process has taken already."""
+    (machine / "proc" / "self" / "status").write_text("VmRSS:   100000 kB\n")
+    monkeypatch.setattr(capacity, "_limit", 300 << 20)
+    assert capacity.free_memory() == (300 << 20) - 100_000 * 1024
+    monkeypatch.setattr(capacity, "_limit", 9 << 30)
+    assert capacity.free_memory() == (8 << 30) - (256 << 20)
+    monkeypatch.setattr(capacity, "_limit", 1 << 20)
+    assert capacity.free_memory() == 0

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 from numpy.typing import NDArray
 
+from quiltcli.analysis.delivery import film_problems
 from quiltcli.analysis.simulate import PictureOptions, simulate
 from quiltcli.errors import JobError, OutputError, Problem, missing_extra, raise_all
 from quiltcli.exchange.film.reels import Reel, reels_of
@@ -42,6 +43,7 @@ class FilmOptions:
         bits: of numbered pictures, 8 or 16; a DPX has 10.
         size: of a simulation, width and height.
         overwrite: replace files that exist.
+        target: who will play them, a name of `delivery.TARGETS`; empty for nobody known.
     """
 
     subject: str = "pages"
@@ -51,6 +53,7 @@ class FilmOptions:
     bits: int = 8
     size: tuple[int, int] = (1920, 1080)
     overwrite: bool = False
+    target: str = ""
 
 
 def make_film(
@@ -78,6 +81,8 @@ def make_film(
         return _simulated(out, path, codec, options, say)
     reels = reels_of(out, options.subject.removesuffix("s"), options.frames)
     targets = [_target(path, codec, reel.name, len(reels)) for reel in reels]
+    if options.target:
+        raise_all(JobError, film_problems(codec, targets, options.target))
     _refuse(targets, options)
     for reel, target in zip(reels, targets, strict=True):
         with _opened(target, codec, reel.fps, options) as show:

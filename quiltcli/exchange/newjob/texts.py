@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from quiltcli.exchange.newjob.kinds import kind_of
 from quiltcli.exchange.newjob.stand import Stand
@@ -90,8 +91,24 @@ def content_text() -> str:
     return "\n".join(lines) + "\n"
 
 
-def scene_text(stand: Stand, content: str | None) -> str:
-    """The scene file: the mesh that was given, or two stand-ins."""
+@dataclass(frozen=True)
+class Content:
+    """What is to be shown.
+
+    Attributes:
+        file: its name as the scene file has it.
+        moves: whether it holds animations.
+        lit: whether it holds lights.
+    """
+
+    file: str
+    moves: bool = False
+    lit: bool = False
+
+
+def scene_text(stand: Stand, content: Content | None) -> str:
+    """The scene file: the mesh that was given, with its animations and lights, or two stand-ins."""
+    lights = "- {type: directional, direction: [-1, -2, -1], color: [3, 3, 3]}\n"
     if content is None:
         (x, y, z), (ex, _, ez) = stand.look_at, stand.eye
         # Half as far behind what is looked at as the eye is before it, and to the right.
@@ -109,16 +126,18 @@ def scene_text(stand: Stand, content: str | None) -> str:
             " material: {color: [0.1, 0.4, 0.7]}}\n"
         )
     else:
+        motion = ", animation: {}" if content.moves else ""
         objects = (
             "# Metres, Y up, where the file puts it; else add transform: {translate: [x, y, z], scale: 1},\n"
             "# units: mm or up_axis: z beside mesh.\n"
-            f"objects:\n- {{name: content, mesh: {json.dumps(content, ensure_ascii=False)}}}\n"
+            f"objects:\n- {{name: content, mesh: {json.dumps(content.file, ensure_ascii=False)}{motion}}}\n"
         )
+        if content.lit:
+            lights = "- {type: file}   # those of the file\n"
     return (
         "# What is to be seen, in the same metres as the display: in front of it and behind it.\n"
         f"quilt_scene: 1\n{objects}"
-        "lights:\n"
-        "- {type: directional, direction: [-1, -2, -1], color: [3, 3, 3]}\n"
+        f"lights:\n{lights}"
         "- {type: ambient, color: [0.2, 0.2, 0.25]}\n"
         "background: [0.02, 0.04, 0.08]\n"
     )
@@ -129,6 +148,11 @@ def job_text(wishes: Wishes, stand: Stand, frames: tuple[int, ...]) -> str:
     layout = "layout: layout.yaml\n" if wishes.canvas else ""
     # Neighbours that touch on the canvas leave no room to bleed into.
     bleed = f"render:\n  bleed: {wishes.padding}\n" if wishes.canvas and wishes.padding < 2 else ""
+    alone = (
+        "  facets: false   # the canvas alone; true writes each panel's picture as well\n"
+        if wishes.canvas
+        else ""
+    )
     return (
         "#     quilt check job.yaml                        every mistake in these files, at once\n"
         "#     quilt simulate job.yaml -f 1 -o eye.png     what the viewer will see\n"
@@ -143,7 +167,7 @@ def job_text(wishes: Wishes, stand: Stand, frames: tuple[int, ...]) -> str:
         f"  path:\n{_path(stand, frames)}"
         f"{bleed}"
         "output:\n"
-        "  directory: out\n"
+        f"  directory: out\n{alone}"
     )
 
 

@@ -19,6 +19,7 @@ from quiltcli.exchange.newjob.plan import PAPER, draw_plan
 from quiltcli.exchange.newjob.stand import Stand, stand_for
 from quiltcli.exchange.newjob.wishes import Ball, Panel, Wishes
 from quiltcli.formats.drawing.png import write_png
+from quiltcli.formats.gltf.container import read_container
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.whole import make_folder, write_text
 from quiltcli.formats.yaml.source import Source
@@ -102,8 +103,8 @@ def write_new_job(wishes: Wishes, folder: Path) -> list[Path]:
     return [folder / name for name in (*job.files, "plan.png")]
 
 
-def _content(wishes: Wishes, folder: Path) -> str | None:
-    """The content's file as the scene file will name it."""
+def _content(wishes: Wishes, folder: Path) -> texts.Content | None:
+    """The content as the scene file will name it; animations and lights of a glTF file are taken along."""
     if wishes.scene is None:
         return None
     path = Path(wishes.scene)
@@ -111,7 +112,12 @@ def _content(wishes: Wishes, folder: Path) -> str | None:
         raise JobError(f"--scene: expected a mesh ({', '.join(MESHES)}), got {wishes.scene!r}")
     if not path.is_file():
         raise JobError(f"--scene: no such file: {wishes.scene}")
-    return Path(os.path.relpath(path, folder)).as_posix()
+    name = Path(os.path.relpath(path, folder)).as_posix()
+    if path.suffix.lower() not in (".glb", ".gltf"):
+        return texts.Content(name)
+    held = read_container(path).json
+    moves = held["animations"].length() > 0
+    return texts.Content(name, moves, held.extension("KHR_lights_punctual")["lights"].length() > 0)
 
 
 def _display(wishes: Wishes, built: tuple[Panel, ...] | Ball, folder: Path) -> tuple[dict[str, str], Facets]:

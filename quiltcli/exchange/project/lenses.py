@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -36,7 +36,13 @@ class Steps(NamedTuple):
 
 
 class Lens(Protocol):
-    """What kind of picture it is."""
+    """What kind of picture it is; a frozen dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def axes(self) -> FloatArray:
+        """(3, 3) rows right, up, forward."""
 
     @property
     def wraps(self) -> str:
@@ -49,8 +55,14 @@ class Lens(Protocol):
         """How far places of directions (3, ...) move when these change by `step` (3,)."""
 
 
+WORLD = np.eye(3)
+"""Axes of a lens that is given directions along its own axes already; told by identity, not by value."""
+
+
 def turned(axes: FloatArray, d: FloatArray) -> FloatArray:
     """Directions or steps (3, ...) along axes (3, 3); products are summed in order, for equal results."""
+    if axes is WORLD:
+        return d
     shaped = axes[:, :, *[None] * (d.ndim - 1)]
     result: FloatArray = shaped[:, 0] * d[0] + shaped[:, 1] * d[1] + shaped[:, 2] * d[2]
     return result

@@ -13,7 +13,7 @@ import numpy as np
 
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.exchange.elsewhere import Made, MadeOptions, prepare_made, write_made
-from quiltcli.exchange.project.lenses import Lens
+from quiltcli.exchange.project.lenses import WORLD, Lens
 from quiltcli.exchange.project.master import Master, loaded
 from quiltcli.exchange.project.sights import Rays, facet_rays, shown_pixels
 from quiltcli.exchange.project.stmap import write_st_maps
@@ -40,7 +40,6 @@ class Projected:
     """What is common to all tiles of a view."""
 
     stage: Stage
-    lens: Lens
     texels: Texels
     buffers: Buffers
 
@@ -118,8 +117,8 @@ def _fill(
 ) -> Made:
     """Fill the buffers of a view."""
     lens, texels = _lookup(master, kept, view)
-    task = Projected(stage, lens, texels, buffers)
-    shown = list(pool.map(lambda band: _band(task, *band), list(_bands(stage, view))))
+    task = Projected(stage, texels, buffers)
+    shown = list(pool.map(lambda band: _band(task, *band), list(_bands(stage, view, lens))))
     whole, seen = sum(pixels for pixels, _ in shown), sum(count for _, count in shown)
     dark = 1 - seen / whole if whole else 0.0
     warnings = [f"the picture does not show {dark:.1%} of the lit facets' pixels"] if dark > 0.0005 else []
@@ -150,18 +149,25 @@ def _lookup(master: Master, kept: Kept, view: View) -> tuple[Lens, Texels]:
     return master.lens(view, kept[key].size), kept[key]
 
 
-def _bands(stage: Stage, view: View) -> Iterator[tuple[int, Window, Rays]]:
-    """Rows of tiles on the pages: the facet's row in the layout, a window, and its rays."""
+def _bands(stage: Stage, view: View, lens: Lens) -> Iterator[tuple[int, Window, Rays, Lens]]:
+    """Rows of tiles on the pages: the facet's row in the layout, a window, its rays and the lens for them.
+
+    Rays of a flat facet are turned to the lens's own axes once, and not pixel by pixel.
+    """
+    local = replace(lens, axes=WORLD)
     for viewer in view.viewers:
         lit = their_lit_facets(stage.facets, viewer) & (stage.layout.page >= 0)
         rays = facet_rays(stage, viewer)
         for row in np.flatnonzero(lit).tolist():
+            own, its = rays[row], lens
+            if isinstance(own, np.ndarray):
+                own, its = lens.axes @ own, local
             whole = Window(*surroundings(stage.layout, row, stage.job.render.bleed + 1))
             for band in whole.tiles(whole.x1 - whole.x0, TILE[1]):
-                yield row, band, rays[row]
+                yield row, band, own, its
 
 
-def _band(task: Projected, row: int, band: Window, rays: Rays) -> tuple[int, int]:
+def _band(task: Projected, row: int, band: Window, rays: Rays, lens: Lens) -> tuple[int, int]:
     """Fill a row of tiles; the facet's pixels in it, and how many of them show the picture."""
     layout = task.stage.layout
     page, facet = int(layout.page[row]), layout.facet[row]
@@ -178,7 +184,7 @@ def _band(task: Projected, row: int, band: Window, rays: Rays) -> tuple[int, int
             inside, mine = inside & shown, mine & shown
         if not mine.any():
             continue
-        values = tile_light(tile, rays, task.lens, task.texels).astype(np.float16)
+        values = tile_light(tile, rays, lens, task.texels).astype(np.float16)
         for c, channel in enumerate(channels):
             np.copyto(channel[spot], values[..., c], where=mine)
         pixels += int(np.count_nonzero(inside))

@@ -33,8 +33,10 @@ def directions_at(rays: Rays, x: FloatArray, y: FloatArray) -> FloatArray:
     if isinstance(rays, ChartView):
         found = rays.rays(x, y)
         return np.where(np.isfinite(found.sum(axis=0)), found, _wide(_AHEAD, found.ndim))
-    result: FloatArray = np.stack([row[0] * x + row[1] * y + row[2] for row in rays])
-    return result
+    d = np.empty((3, *np.broadcast_shapes(x.shape, y.shape)))
+    for k, row in enumerate(rays):
+        np.add(row[0] * x + row[2], row[1] * y, out=d[k])
+    return d
 
 
 def slopes_at(rays: Rays, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -41,13 +41,18 @@ class Texels:
             reach: texels of the kernel before the place: 1 of a tent, 2 of a cubic.
         """
         width, height = self.size
-        x, y = np.clip(place.x, 0, width) - 0.5, np.clip(place.y, 0, height) - 0.5
-        left, top = np.floor(x), np.floor(y)
-        start = MARGIN + 1 - reach
-        row = top.astype(np.int64) + start
+        # Counted from the margin's first texel nothing is negative, and cutting off is rounding down.
+        x, y = np.clip(place.x, 0, width), np.clip(place.y, 0, height)
+        x += MARGIN + 0.5 - reach
+        y += MARGIN + 0.5 - reach
+        left, row = x.astype(np.int64), y.astype(np.int64)
+        x -= left
+        y -= row
         if place.face is not None:
             row += place.face * self.height
-        return row * self.width + (left.astype(np.int64) + start), x - left, y - top
+        row *= self.width
+        row += left
+        return row, x, y
 
     def linear(self, place: Place) -> Float32Array:
         """Light (P, 4) between the four texels around."""
@@ -71,11 +76,11 @@ class Texels:
     def cubic(self, place: Place, blur: tuple[float, float]) -> Float32Array:
         """Light (P, 4) by cubics over the 16 texels around; `blur` is B of the kernels across and down."""
         at, tx, ty = self.first(place, 2)
-        across = [_wide(weight) for weight in cubic_weights(tx, blur[0])]
+        across = cubic_weights(_wide(tx), blur[0])
         light = np.zeros((at.size, 4), dtype=np.float32)
         # Into buffers that are there: whole rows of four numbers in one run is what this is fast by.
         line, texel = np.empty_like(light), np.empty_like(light)
-        for row, weight in enumerate(cubic_weights(ty, blur[1])):
+        for row, weight in enumerate(cubic_weights(_wide(ty), blur[1])):
             start = at + row * self.width
             self.light.take(start, axis=0, out=line, mode="clip")
             line *= across[0]
@@ -83,35 +88,44 @@ class Texels:
                 self.light.take(start + column, axis=0, out=texel, mode="clip")
                 texel *= across[column]
                 line += texel
-            line *= _wide(weight)
+            line *= weight
             light += line
         # Its lobes dip below black beside what is bright, and rise above that.
         return np.clip(light, 0, MOST_HALF, out=light)
 
 
-def _wide(weight: FloatArray) -> Float32Array:
-    """A weight (P,) once for each channel (P, 4)."""
-    return np.repeat(weight.astype(np.float32), 4).reshape(-1, 4)
+def _wide(share: FloatArray) -> Float32Array:
+    """A number (P,) once for each channel (P, 4)."""
+    wide = np.empty((share.size, 4), dtype=np.float32)
+    wide[...] = share[:, None]
+    return wide
 
 
-def cubic_weights(t: FloatArray, b: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Weights of four texels for a place `t` (P,) after the second: Mitchell & Netravali's cubics.
+def cubic_weights(t: Float32Array, b: float) -> tuple[Float32Array, ...]:
+    """Weights of four texels for places `t` (...) after the second: Mitchell & Netravali's cubics.
 
     Of "Reconstruction Filters in Computer Graphics" (1988), with their 2C = 1 − B, of which B = 0 is Catmull
-    and Rom's, which goes through the texels. The variance is B / 3.
+    and Rom's, which goes through the texels. The variance is B / 3. Their pieces are multiplied out in t, by
+    the texel; the weights sum to 1.
     """
     c = (1 - b) / 2
+    before = _cubic(t, b / 6, -b / 2 - c, b / 2 + 2 * c, -b / 6 - c)
+    own = _cubic(t, 1 - b / 3, 0.0, -3 + 2 * b + c, 2 - 1.5 * b - c)
+    last = _cubic(t, 0.0, 0.0, -c, b / 6 + c)
+    following = 1 - before
+    following -= own
+    following -= last
+    return before, own, following, last
 
-    def near(x: FloatArray) -> FloatArray:
-        result: FloatArray = (((12 - 9 * b - 6 * c) * x + (-18 + 12 * b + 6 * c)) * x * x + (6 - 2 * b)) / 6
-        return result
 
-    def far(x: FloatArray) -> FloatArray:
-        inner = (-b - 6 * c) * x + (6 * b + 30 * c)
-        result: FloatArray = ((inner * x + (-12 * b - 48 * c)) * x + (8 * b + 24 * c)) / 6
-        return result
-
-    return far(1 + t), near(t), near(1 - t), far(2 - t)
+def _cubic(t: Float32Array, c0: float, c1: float, c2: float, c3: float) -> Float32Array:
+    """A polynomial of t, by Horner's rule."""
+    value = t * c3
+    for c in (c2, c1):
+        value += c
+        value *= t
+    value += c0
+    return value
 
 
 def texels(pictures: list[Float32Array], lens: Lens) -> Texels:

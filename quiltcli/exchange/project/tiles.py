@@ -10,7 +10,10 @@ side of s texels
     s > √2       a tent, whose variance of 1/6 is that of a box of √2, under a box of √(s² − 2) texels, taken
                  as the mean of ⌈s / √2⌉ samples,
 
-and nothing jumps where one becomes the other.
+and nothing jumps where one becomes the other. Where both sides run along one direction of the picture, as
+near the pole of a panorama, samples on a grid of sides repeat one another: there the box is that square of
+the pixel whose sides are mapped to the axes of the ellipse of the same variances, which needs as many
+samples as the ellipse is long. All squares have the same variance in all directions.
 """
 
 from __future__ import annotations
@@ -20,12 +23,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.exchange.project.lenses import Lens, Place
+from quiltcli.exchange.project.lenses import Lens, Place, Steps
 from quiltcli.exchange.project.sights import Rays, directions_at, moved, slopes_at
 from quiltcli.exchange.project.texels import Texels
 from quiltcli.geometry import Float32Array, FloatArray
 
-TILE = (128, 64)
+TILE = (128, 32)  # whose arrays of four floats a pixel are 64 KB: the system takes back larger ones
 MOST = 16  # samples a side: beyond them a picture is noise, but for poles, where it hardly changes
 _SPLIT = 16  # pixels: tiles are not cut smaller
 _TENT2 = 2.0  # square of the width of the box whose variance is a tent's
@@ -71,7 +74,7 @@ def tile_light(window: Window, rays: Rays, lens: Lens, texels: Texels) -> Float3
     place = lens.place(d.reshape(3, -1))
     if not place.inside.any():
         return np.zeros((height, width, 4), dtype=np.float32)
-    nx, ny = _counts(window, rays, lens)
+    nx, ny, turned = _counts(window, rays, lens)
     if nx * ny > 4 and min(width, height) > _SPLIT:
         light = np.empty((height, width, 4), dtype=np.float32)
         for part in window.tiles(-(-width // 2), -(-height // 2)):
@@ -84,7 +87,7 @@ def tile_light(window: Window, rays: Rays, lens: Lens, texels: Texels) -> Float3
         if not place.inside.all():
             light *= place.inside[:, None]
     else:
-        light = _boxed(window, rays, lens, texels, d, (nx, ny))
+        light = _boxed(window, rays, lens, texels, d, (nx, ny), turned=turned)
     return light.reshape(height, width, 4)
 
 
@@ -93,17 +96,35 @@ def directions(window: Window, rays: Rays) -> FloatArray:
     return directions_at(rays, *window.centres())
 
 
-def _counts(window: Window, rays: Rays, lens: Lens) -> tuple[int, int]:
-    """Samples across and down for the longest steps in texels at 5 × 5 places over a window."""
+def _counts(window: Window, rays: Rays, lens: Lens) -> tuple[int, int, bool]:
+    """Samples across and down for the longest steps in texels at 5 × 5 places over a window.
+
+    And whether they are along the axes of the pixels' ellipses, where that takes fewer.
+    """
     x = np.linspace(window.x0 + 0.5, window.x1 - 0.5, 5)
     y = np.linspace(window.y0 + 0.5, window.y1 - 0.5, 5)[:, None]
     d = directions_at(rays, x, y)
     inside = lens.place(d).inside
     if not inside.any():
         inside[:] = True  # only a corner of the picture lies between these places
-    steps = (lens.steps(d, slope) for slope in slopes_at(rays, x, y))
-    x_side, y_side = (float(np.hypot(step.x, step.y)[inside].max()) for step in steps)
-    return _samples(x_side), _samples(y_side)
+    across, down = (lens.steps(d, slope) for slope in slopes_at(rays, x, y))
+    sides = [_samples(float(np.hypot(step.x, step.y)[inside].max())) for step in (across, down)]
+    _, long, short = _ellipses(across, down)
+    axes = [_samples(float(np.sqrt(axis[inside].max()))) for axis in (long, short)]
+    turned = axes[0] * axes[1] < sides[0] * sides[1]
+    nx, ny = axes if turned else sides
+    return nx, ny, turned
+
+
+def _ellipses(across: Steps, down: Steps) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of pixels' footprints the angle (...) on the page of what is longest in the picture, and both axes².
+
+    The steps are columns of a matrix; these are its right singular vectors and the squares of its values.
+    """
+    p, q = across.x**2 + across.y**2, down.x**2 + down.y**2
+    r = across.x * down.x + across.y * down.y
+    apart = np.sqrt((p - q) ** 2 + 4 * r * r)
+    return np.arctan2(2 * r, p - q) / 2, (p + q + apart) / 2, np.maximum((p + q - apart) / 2, 0.0)
 
 
 def _samples(side: float) -> int:
@@ -127,20 +148,26 @@ def _boxed(
     texels: Texels,
     d: FloatArray,
     count: tuple[int, int],
+    *,
+    turned: bool,
 ) -> Float32Array:
-    """Mean light (P, 4) of samples over the pixels' boxes."""
-    spread = []
+    """Mean light (P, 4) of samples over the pixels' boxes, with sides along the page, or turned."""
     slopes = slopes_at(rays, *window.centres())
-    for slope in slopes:
-        step = lens.steps(d, slope)
-        square = np.maximum(step.x * step.x + step.y * step.y, 1e-30)
-        spread.append(np.sqrt(np.clip(1 - _TENT2 / square, 0, 1)))
+    across, down = (lens.steps(d, slope) for slope in slopes)
+    cos = sin = across.x
+    if turned:
+        angle, *squares = _ellipses(across, down)
+        cos, sin = np.cos(angle), np.sin(angle)
+    else:
+        squares = [step.x * step.x + step.y * step.y for step in (across, down)]
+    spread = [np.sqrt(np.clip(1 - _TENT2 / np.maximum(square, 1e-30), 0, 1)) for square in squares]
     light = np.zeros((d[0].size, 4), dtype=np.float32)
     for j in range(count[1]):
-        down = ((j + 0.5) / count[1] - 0.5) * spread[1]
+        second = ((j + 0.5) / count[1] - 0.5) * spread[1]
         for i in range(count[0]):
-            across = ((i + 0.5) / count[0] - 0.5) * spread[0]
-            place = lens.place(moved(d, slopes, across, down).reshape(3, -1))
+            first = ((i + 0.5) / count[0] - 0.5) * spread[0]
+            x, y = (first * cos - second * sin, first * sin + second * cos) if turned else (first, second)
+            place = lens.place(moved(d, slopes, x, y).reshape(3, -1))
             one = texels.linear(place)
             if not place.inside.all():
                 one *= place.inside[:, None]
