@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
 from quiltcli.charts.chart import Chart
-from quiltcli.display import Facets
+from quiltcli.display import Facets, scaled
 from quiltcli.errors import DisplayError, JobError
 from quiltcli.formats.exr.image import write_exr
 from quiltcli.geometry.resection import Pinhole
@@ -286,3 +288,18 @@ def test_weights_of_a_file_take_the_place_of_those_of_the_geometry(tmp_path):
     assert facets.response.blend is not None
     assert facets.response.blend.shares[0] == pytest.approx(0.25)
     assert facets.response.blend.shares[1].max() == 1
+
+
+def test_proxies_with_fewer_pixels_have_the_same_shares(tmp_path):
+    facets = projected(tmp_path, WALL, LEFT + RIGHT, "blend: {black: 0.01}\n")
+    small = scaled(facets, Fraction(1, 4))
+    assert facets.response is not None
+    assert facets.response.blend is not None
+    assert small.response is not None
+    assert small.response.blend is not None
+    for row, (whole, part) in enumerate(
+        zip(facets.response.blend.shares, small.response.blend.shares, strict=True)
+    ):
+        assert part.shape == (small.size[row, 1], small.size[row, 0])
+        assert (part == whole[2::4, 2::4]).all()  # under the centres of pixels four times as large
+    assert [lift.shape for lift in small.response.blend.lift] == [(32, 48), (36, 40)]
