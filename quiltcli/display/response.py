@@ -104,12 +104,18 @@ class Response:
         degrees = np.degrees(np.arccos(cosine))
         return np.stack([np.interp(degrees, self.angles, column) for column in self.bright.T])
 
-    def brightening(self, cosine: FloatArray) -> FloatArray:
+    def brightening(self, cosine: FloatArray, brightness: FloatArray | None = None) -> FloatArray:
         """What light is multiplied by to make up for the angle, `limit` at most: (P,) or (3, P)."""
-        return np.minimum(1.0 / self.brightness(cosine), self.limit)
+        found = self.brightness(cosine) if brightness is None else brightness
+        return np.minimum(1.0 / found, self.limit)
 
     def wanted(
-        self, facet: int, light: FloatArray, cosine: FloatArray, place: Place | None = None
+        self,
+        facet: int,
+        light: FloatArray,
+        cosine: FloatArray,
+        place: Place | None = None,
+        brightness: FloatArray | None = None,
     ) -> FloatArray:
         """Images that make a facet show some light, whether or not the panel can give that.
 
@@ -118,11 +124,12 @@ class Response:
             light: (3, P).
             cosine: (P,) of the angles at which pixels are seen.
             place: x and y (P,) of the pixels, facet pixels; where pictures are blended.
+            brightness: of these cosines, where it is known already.
 
         Returns:
             (3, P).
         """
-        image = light * (self.level * self.gain[facet])[:, None] * self.brightening(cosine)
+        image = light * (self.level * self.gain[facet])[:, None] * self.brightening(cosine, brightness)
         if self.blend is not None and place is not None:
             image = image * self._at(self.blend.shares[facet], place)
             if self.blend.lift:
