@@ -210,7 +210,19 @@ def scaled(facets: Facets, scale: Fraction) -> Facets:
         du, dv = facets.du * ratio[:, :1], facets.dv * ratio[:, 1:]
     pairs = zip(facets.charts, size.tolist(), strict=False)
     charts = tuple(None if chart is None else chart.scaled((wide, high)) for chart, (wide, high) in pairs)
-    return replace(facets, size=size.astype(np.int32), du=du, dv=dv, places=None, charts=charts)
+    response = facets.response
+    if response is not None and response.blend is not None:
+        sizes = [(wide, high) for wide, high in size.tolist()]
+        response = replace(response, blend=response.blend.scaled(sizes))
+    return replace(
+        facets,
+        size=size.astype(np.int32),
+        du=du,
+        dv=dv,
+        places=None,
+        charts=charts,
+        response=response,
+    )
 
 
 def lit_facets(facets: Facets, eye: FloatArray) -> BoolArray:

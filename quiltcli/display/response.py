@@ -10,6 +10,7 @@ of the facet's normal and the view; that is b = cos θ, an exponent of 1.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -26,6 +27,7 @@ from quiltcli.job.dump import plain
 _PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))
 _WHITE = (0.3127, 0.3290)
 _EDGE_ON = 1e-9
+_LEAST_SHARE = 0.02
 Place: TypeAlias = tuple[FloatArray, FloatArray]
 
 
@@ -42,6 +44,21 @@ class Blend:
     shares: tuple[FloatArray, ...]
     lift: tuple[FloatArray, ...]
     black: float
+
+    def scaled(self, sizes: Sequence[tuple[int, int]]) -> Blend:
+        """The same for pictures with other numbers of pixels, width and height."""
+        shares = tuple(_resized(values, size) for values, size in zip(self.shares, sizes, strict=True))
+        lift = tuple(_resized(values, size) for values, size in zip(self.lift, sizes, strict=False))
+        return Blend(shares, lift, self.black)
+
+
+def _resized(values: FloatArray, size: tuple[int, int]) -> FloatArray:
+    """The values (H, W) under the centres of other pixels, width and height."""
+    row, column = (
+        np.minimum((np.arange(new) + 0.5) * old // new, old - 1).astype(np.int64)
+        for new, old in zip(size[::-1], values.shape, strict=True)
+    )
+    return values[np.ix_(row, column)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,12 +104,18 @@ class Response:
         degrees = np.degrees(np.arccos(cosine))
         return np.stack([np.interp(degrees, self.angles, column) for column in self.bright.T])
 
-    def brightening(self, cosine: FloatArray) -> FloatArray:
+    def brightening(self, cosine: FloatArray, brightness: FloatArray | None = None) -> FloatArray:
         """What light is multiplied by to make up for the angle, `limit` at most: (P,) or (3, P)."""
-        return np.minimum(1.0 / self.brightness(cosine), self.limit)
+        found = self.brightness(cosine) if brightness is None else brightness
+        return np.minimum(1.0 / found, self.limit)
 
     def wanted(
-        self, facet: int, light: FloatArray, cosine: FloatArray, place: Place | None = None
+        self,
+        facet: int,
+        light: FloatArray,
+        cosine: FloatArray,
+        place: Place | None = None,
+        brightness: FloatArray | None = None,
     ) -> FloatArray:
         """Images that make a facet show some light, whether or not the panel can give that.
 
@@ -101,16 +124,30 @@ class Response:
             light: (3, P).
             cosine: (P,) of the angles at which pixels are seen.
             place: x and y (P,) of the pixels, facet pixels; where pictures are blended.
+            brightness: of these cosines, where it is known already.
 
         Returns:
             (3, P).
         """
-        image = light * (self.level * self.gain[facet])[:, None] * self.brightening(cosine)
+        image = light * (self.level * self.gain[facet])[:, None] * self.brightening(cosine, brightness)
         if self.blend is not None and place is not None:
             image = image * self._at(self.blend.shares[facet], place)
             if self.blend.lift:
                 image = image + self._at(self.blend.lift[facet], place)
         return _raised(image, 1.0 / float(self.power[facet]))
+
+    def meant(self, facet: int, image: FloatArray, cosine: FloatArray, place: Place) -> FloatArray:
+        """The light (3, P) that images were made to show together: `wanted` undone, but for `level`.
+
+        Where a projector gives next to nothing of the light its images say next to nothing of it.
+        """
+        light = _raised(image, float(self.power[facet]))
+        share = np.ones(cosine.shape)
+        if self.blend is not None:
+            if self.blend.lift:
+                light = np.maximum(light - self._at(self.blend.lift[facet], place), 0.0)
+            share = np.maximum(self._at(self.blend.shares[facet], place), _LEAST_SHARE)
+        return np.asarray(light / (self.gain[facet][:, None] * self.brightening(cosine) * share))
 
     @staticmethod
     def _at(values: FloatArray, place: Place) -> FloatArray:

@@ -29,7 +29,8 @@ from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
 
-_BAND = 1 << 18  # pixels of a band of rows
+_BAND = 1 << 16  # pixels of a band of rows, so that what is worked out of them stays near
+_DENSE = 0.6  # of the pixels of a band
 _MOST_FRAMES = 50  # looked at before anything is drawn
 _PLACES = 17  # across and down a curved facet, likewise
 _LIMB = 0.05  # a round display always has pixels that are seen edge-on: those say nothing
@@ -124,16 +125,20 @@ def _corrected(
     response: Response, row: int, light: FloatArray, cosine: FloatArray, place: Place
 ) -> tuple[FloatArray, Headroom]:
     """The image (3, P) of a facet for light (3, P) at angles with these cosines (P,), and what it asked."""
-    wanted = response.wanted(row, light, cosine, place)
-    most = min(response.peak, float(MOST_HALF)) if response.clip else float(MOST_HALF)
     brightness = response.brightness(cosine)
+    wanted = response.wanted(row, light, cosine, place, brightness)
+    most = min(response.peak, float(MOST_HALF)) if response.clip else float(MOST_HALF)
+    some = (light[0] != 0) | (light[1] != 0) | (light[2] != 0)
+    limited = some & (brightness * response.limit < 1).reshape(-1, cosine.size).any(axis=0)
+    dark = brightness.reshape(-1, some.size)[:, some]
+    most_brightened = np.minimum(1 / dark, response.limit).max(initial=0)
     high = wanted.max(axis=0) / response.peak
     headroom = Headroom(
-        pixels=cosine.size,
+        pixels=int(np.count_nonzero(some)),
         over=int(np.count_nonzero(high > 1)),
-        limited=int(np.count_nonzero((brightness * response.limit < 1).reshape(-1, cosine.size).any(axis=0))),
+        limited=int(np.count_nonzero(limited)),
         brightest=float(high.max()),
-        brightened=float(response.brightening(cosine).max()),
+        brightened=float(most_brightened),
     )
     return np.clip(wanted, -most, most), headroom
 
@@ -178,15 +183,27 @@ def on_panels(
         channels = [page_of(buffers[name], stage.layout, page)[here] for name in "RGB"]
         if not black:
             mine &= (channels[0] != 0) | (channels[1] != 0) | (channels[2] != 0)
-        y, x = np.nonzero(mine)
-        if not y.size:
-            return []
-        light = np.stack([channel[y, x] for channel in channels]).astype(np.float64)
-        matrix = inverse_affine(stage.layout.quilt_from_facet[row])
-        i, j = matrix @ np.stack((x + (x0 + 0.5), y + (y0 + 0.5), np.ones(y.size)))
+        whole = np.count_nonzero(mine) > _DENSE * mine.size
+        if whole:
+            # Looking at all of a rectangle is quicker than picking most of it.
+            y, x = np.arange(y0, y1)[:, None], np.arange(x0, x1)
+            light = np.stack([np.where(mine, channel, 0) for channel in channels]).astype(np.float64)
+            light = light.reshape(3, -1)
+        else:
+            y, x = np.nonzero(mine)
+            if not y.size:
+                return []
+            light = np.stack([channel[y, x] for channel in channels]).astype(np.float64)
+            y, x = y + y0, x + x0
+        (a, b, c), (d, e, f) = inverse_affine(stage.layout.quilt_from_facet[row])
+        i = (a * (x + 0.5) + b * (y + 0.5) + c).reshape(-1)
+        j = (d * (x + 0.5) + e * (y + 0.5) + f).reshape(-1)
         light, said = change(row, light, cosines(stage.facets, stage.layout, row, (i, j), eye), (i, j))
         for channel, values in zip(channels, light, strict=True):
-            channel[y, x] = values
+            if whole:
+                np.copyto(channel, values.reshape(channel.shape), where=mine, casting="same_kind")
+            else:
+                channel[y - y0, x - x0] = values
         return [said]
 
     with ThreadPoolExecutor(threads) as pool:

@@ -17,6 +17,7 @@ from quiltcli.analysis.info.record import finite, number, spread
 from quiltcli.cli import main
 from quiltcli.errors import DisplayError, JobError, OutputError
 from quiltcli.formats.exr.image import write_exr
+from tests.helpers.projected import WALL, projected
 from tests.helpers.tiny_job import replaced, write_tiny_job
 
 MODELS = Path(__file__).parents[2] / "display_models"
@@ -297,3 +298,16 @@ def test_numbers_are_short() -> None:
     assert [number(v) for v in (1.0, -0.0, 0.1234567, 12)] == ["1", "0", "0.123457", "12"]
     assert spread(1.0, 1.0000001, "mm") == "1 mm"
     assert spread(1.0, 2.0, "mm") == "1 to 2 mm"
+
+
+def test_projectors_say_where_they_stand_and_how_well_they_fit(tmp_path: Path) -> None:
+    # A lens 3 m before the wall, of 120 pixels focal length, its axis through (30, 24).
+    rows = [((x, y, 0), (30 + 40 * x, 24 - 40 * y)) for x in (-0.5, 0.5) for y in (-0.4, 0.4)]
+    rows += [((x, y, 1), (30 + 60 * x, 24 - 60 * y)) for x, y in ((0.2, 0.1), (-0.3, 0.2), (0.1, -0.25))]
+    points = "".join(f"  - {{world: {list(w)}, pixel: {list(p)}}}\n" for w, p in rows)
+    facets = projected(tmp_path, WALL, f"- name: a\n  pixels: [60, 48]\n  points:\n{points}")
+    assert facets.count == 1
+    words = lines(describe(tmp_path / "display.yaml"))
+    assert words["projectors"] == "1"
+    assert words["facet 1"].startswith("projector at (0.000, 0.000, 3.000) m, 100.0 % of its pixels")
+    assert "px rms" in words["facet 1"]

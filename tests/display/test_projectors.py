@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
 from quiltcli.charts.chart import Chart
-from quiltcli.display import Facets
+from quiltcli.display import Facets, load_display, scaled
+from quiltcli.display.response import Blend
 from quiltcli.errors import DisplayError, JobError
 from quiltcli.formats.exr.image import write_exr
 from quiltcli.geometry.resection import Pinhole
+from quiltcli.job import job_sha256, load_display_file
 from tests.helpers.curved_jobs import write_map
-from tests.helpers.projected import LEFT, RIGHT, SPHERE, WALL, projected
+from tests.helpers.even_light import even_job
+from tests.helpers.projected import LEFT, RIGHT, SPHERE, WALL, projected, projected_text
 
 LENS = "lens: {at: [0, 0, 3], look_at: [0, 0, 0], throw: 1.5"
 
@@ -123,9 +128,6 @@ def test_a_map_of_points_is_a_projector_without_a_screen(tmp_path):
     points[:, :, 25:] = np.nan
     write_map(tmp_path / "map.exr", points, np.float32)
     (tmp_path / "display.yaml").write_text("quilt_display: 1\nprojectors:\n- {map: map.exr}\n")
-    from quiltcli.display import load_display
-    from quiltcli.job import load_display_file
-
     chart = chart_of(load_display(load_display_file(tmp_path / "display.yaml")))
     assert chart.mask is not None
     assert chart.mask.sum(axis=1).tolist() == [25] * 20
@@ -226,9 +228,6 @@ def test_a_screen_is_no_display_of_projectors(tmp_path):
     (tmp_path / "other.yaml").write_text(
         (tmp_path / "display.yaml").read_text().replace("screen.yaml", "display.yaml")
     )
-    from quiltcli.display import load_display
-    from quiltcli.job import load_display_file
-
     with pytest.raises(DisplayError, match="screen: is a display of projectors"):
         load_display(load_display_file(tmp_path / "other.yaml"))
 
@@ -286,3 +285,51 @@ def test_weights_of_a_file_take_the_place_of_those_of_the_geometry(tmp_path):
     assert facets.response.blend is not None
     assert facets.response.blend.shares[0] == pytest.approx(0.25)
     assert facets.response.blend.shares[1].max() == 1
+
+
+def test_proxies_with_fewer_pixels_have_the_same_shares(tmp_path):
+    facets = projected(tmp_path, WALL, LEFT + RIGHT, "blend: {black: 0.01}\n")
+    small = scaled(facets, Fraction(1, 4))
+    assert facets.response is not None
+    assert facets.response.blend is not None
+    assert small.response is not None
+    assert small.response.blend is not None
+    for row, (whole, part) in enumerate(
+        zip(facets.response.blend.shares, small.response.blend.shares, strict=True)
+    ):
+        assert part.shape == (small.size[row, 1], small.size[row, 0])
+        assert (part == whole[2::4, 2::4]).all()  # under the centres of pixels four times as large
+    assert [lift.shape for lift in small.response.blend.lift] == [(32, 48), (36, 40)]
+
+
+def blend_of(facets: Facets) -> Blend:
+    assert facets.response is not None
+    assert facets.response.blend is not None
+    return facets.response.blend
+
+
+def test_pictures_fade_within_a_width_and_share_alike_beyond_it(tmp_path):
+    shares = blend_of(projected(tmp_path, WALL, LEFT + RIGHT, "blend: {width: 6}\n")).shares[0]
+    middle = shares[40:90]
+    both = (middle < 1).all(axis=0) & (middle > 0).all(axis=0)
+    assert both.sum() > 20
+    assert (np.abs(middle[:, both] - 0.5) < 1e-9).mean() > 0.5  # deep in both pictures
+    assert middle[:, -1].max() < 0.15  # half a pixel from a border of six
+
+
+def test_a_map_blends_as_the_lens_that_it_is_of(tmp_path):
+    lens = projected(tmp_path, WALL, LEFT + RIGHT, "blend: {black: 0.01}\n")
+    write_map(tmp_path / "right.exr", centres(chart_of(lens, 1)), np.float32)
+    mapped = projected(tmp_path, WALL, f"{LEFT}- {{map: right.exr}}\n", "blend: {black: 0.01}\n")
+    for one, other in zip(blend_of(lens).shares, blend_of(mapped).shares, strict=True):
+        assert np.abs(one - other).max() < 0.02
+        assert np.abs(one - other).mean() < 1e-4
+
+
+def test_the_hash_of_a_job_knows_the_screen(tmp_path):
+    job = even_job(tmp_path, projected_text(tmp_path, SPHERE, LEFT))
+    before = job_sha256(job)
+    layout = chart_of(load_display(load_display_file(tmp_path / "display.yaml"))).record
+    (tmp_path / "screen.yaml").write_text(f"quilt_display: 1\n{SPHERE.replace('radius: 1', 'radius: 1.1')}")
+    assert job_sha256(job) != before
+    assert chart_of(load_display(load_display_file(tmp_path / "display.yaml"))).record != layout

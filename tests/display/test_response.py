@@ -52,6 +52,8 @@ def test_panels_show_the_light_that_was_meant(tmp_path):
         image = panel.wanted(facet, light, cosine)
         assert not np.allclose(image, light)
         assert panel.shown(facet, image, cosine) == pytest.approx(0.4 * light, rel=1e-12)
+        place = np.zeros(50), np.zeros(50)
+        assert panel.meant(facet, image, cosine, place) == pytest.approx(0.4 * light, rel=1e-12)
 
 
 def test_gamma_is_held_against_that_of_the_signal(tmp_path):

@@ -15,7 +15,7 @@ from quiltcli.job import JobFile
 from quiltcli.layout import Layout
 from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.buffers import Buffers, new_buffers
-from quiltcli.render.corrections import on_panels
+from quiltcli.render.corrections import Change, corrects, on_panels
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.methods import draw_frame as draw_by_method
 from quiltcli.render.setup import Stage, stage_of
@@ -142,10 +142,31 @@ def seen_from(stage: Stage, shown: Shown, eye: FloatArray, threads: int) -> Show
     def change(row: int, image: FloatArray, cosine: FloatArray, _: object) -> tuple[FloatArray, None]:
         return response.shown(row, image, cosine), None
 
+    leaks = response.blend is not None and response.blend.black > 0
+    return _changed(stage, shown, eye, change, threads, black=leaks)
+
+
+def meant(stage: Stage, shown: Shown, threads: int) -> Shown:
+    """The images as they would be for perfect panels, where they were corrected for those there are."""
+    response = corrects(stage)
+    if response is None:
+        return shown
+
+    def change(
+        row: int, image: FloatArray, cosine: FloatArray, place: tuple[FloatArray, FloatArray]
+    ) -> tuple[FloatArray, None]:
+        return response.meant(row, image, cosine, place), None
+
+    return _changed(stage, shown, shown.eye, change, threads, black=False)
+
+
+def _changed(
+    stage: Stage, shown: Shown, eye: FloatArray, change: Change[None], threads: int, *, black: bool
+) -> Shown:
+    """The images with their light changed by the angle at which an eye (3,) sees it."""
     buffers = {name: shown.buffers[name].astype(np.float32) for name in "RGB"}
     rows = np.flatnonzero(shown.lit).tolist()
-    leaks = response.blend is not None and response.blend.black > 0
-    on_panels(stage, shown.owners, rows, buffers, eye, change, threads, black=leaks)
+    on_panels(stage, shown.owners, rows, buffers, eye, change, threads, black=black)
     return replace(shown, buffers=buffers)
 
 

@@ -103,8 +103,9 @@ def _net(facets: Facets, size: tuple[int, int]) -> Layout:
     share = min(1.0, 2 * math.sqrt(size[0] * size[1] / max(pixels, 1.0)))
     small = scaled(facets, max(Fraction(share).limit_denominator(1000), Fraction(1, 1000)))
     # Rasters of surfaces are not glued to planes, which a net needs; they lie beside each other.
-    method = "rows" if facets.charts else "net"
-    return pack(small, PackSpec(method=method, padding=2, seconds=1.0))
+    if facets.charts:
+        return pack(small, PackSpec(method="rows", aspect=Fraction(*size), padding=2, seconds=1.0))
+    return pack(small, PackSpec(method="net", padding=2, seconds=1.0))
 
 
 def _best_turn(

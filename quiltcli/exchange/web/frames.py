@@ -9,6 +9,7 @@ import numpy as np
 from quiltcli.analysis.simulate import PictureOptions, figures, heat_map, heat_scale, take_picture
 from quiltcli.analysis.simulate.images import shown_images
 from quiltcli.analysis.simulate.lookup import Shown
+from quiltcli.analysis.simulate.picture import meant
 from quiltcli.analysis.simulate.skin import skin_of
 from quiltcli.display import lit_facets
 from quiltcli.exchange.web.folder import Folder, images_sha
@@ -69,12 +70,19 @@ class FrameView:
     figures: tuple[tuple[str, str], ...]
 
 
-def frame_images(folder: Folder, frame: int) -> Shown:
-    """The images of a frame."""
+def frame_images(folder: Folder, frame: int, *, plain: bool = True) -> Shown:
+    """The images of a frame.
+
+    Args:
+        folder: the output folder.
+        frame: frame number.
+        plain: as they would be for perfect panels, which a page has, where they were corrected for others.
+    """
     stage = folder.stage.at(frame)
     view = stage.views([frame])[0]
     sha = images_sha(folder, frame)
-    return shown_images(stage, view, folder.path, sha, default_threads())[0]
+    shown = shown_images(stage, view, folder.path, sha, default_threads())[0]
+    return meant(stage, shown, default_threads()) if plain else shown
 
 
 def frame_view(folder: Folder, frame: int, errors: bool) -> FrameView:
@@ -90,7 +98,7 @@ def frame_view(folder: Folder, frame: int, errors: bool) -> FrameView:
 
 def _with_errors(folder: Folder, seen: FrameView) -> FrameView:
     """The frame with the errors that `quilt simulate` finds in it."""
-    shown = frame_images(folder, seen.viewer.frame)
+    shown = frame_images(folder, seen.viewer.frame, plain=False)
     stage = folder.stage.at(seen.viewer.frame)
     comparison = take_picture(stage, seen.viewer, shown, PictureOptions(size=_HEAT)).comparison
     if comparison is None:
