@@ -14,10 +14,11 @@ from quiltcli.job.load import load_mirror_file
 from quiltcli.job.mirror import MirrorDisplayFile
 from quiltcli.job.ring import RingSpec
 from quiltcli.lightfield import Field, load_field
-from quiltcli.render.antialiasing import sample_places
+from quiltcli.render.antialiasing import cell_of, sample_places
 from quiltcli.render.setup import texture_limits
 from quiltcli.ring.build import curve_of, rig_of, scene_problems
 from quiltcli.ring.cast import see_by_rays
+from quiltcli.ring.hits import Cell
 from quiltcli.ring.picture import See, Show
 from quiltcli.ring.raster import Mesh, mesh_of, see
 from quiltcli.ring.rebin import as_bits
@@ -85,13 +86,15 @@ class RingStage:
         if not self._meshes or self._meshes[0][0] is not scene:
             self._meshes[:] = [(scene, mesh_of(scene.vertices, scene.triangles))]
         render, channels = self.job.render, self.job.output.channels
+        places = sample_places(render.samples) if render.samples > 1 else ((0.0, 0.0),)
         return Show(
             rig=self.rig,
             curve=curve,
             scene=scene,
             mesh=self._meshes[0][1],
             channels=channels,
-            samples=sample_places(render.samples) if render.samples > 1 else ((0.0, 0.0),),
+            samples=places,
+            cells=tuple(Cell(*cell_of(place, render.samples)) for place in places),
             backface_culling=render.backface_culling,
             near=self.ring.near,
             far=self.ring.farthest,
