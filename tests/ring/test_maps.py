@@ -10,8 +10,10 @@ import pytest
 
 from quiltcli.geometry import FloatArray, dot, rotation_deg
 from quiltcli.ring.curve import Curve, User, overlapping
+from quiltcli.ring.elevation import plane_error
 from quiltcli.ring.maps import backward, forward
 from quiltcli.ring.rig import Pose, ideal_projector
+from tests.helpers.ring_scenes import rig
 
 SIZE = (768, 768)
 HEIGHT, DIAMETER = 0.6, 0.13
@@ -130,6 +132,7 @@ def test_planes_are_off_as_the_elevation_grows(
         u, v, _ = forward(pose(0.4, cone=True), curve, pose(0.4).from_world(points).T)
         off.append(np.hypot(x - u, y - v))
     assert np.sqrt(np.mean(off[0] ** 2)) == pytest.approx(rms, rel=0.05)
+    assert plane_error(rig(SIZE), *viewer) == pytest.approx(rms, rel=0.05, abs=0.001)
     assert max(off[0].max(), off[1].max()) == pytest.approx(worst, rel=0.05, abs=0.006)
     y, x = np.mgrid[:768:6, :768:6].reshape(2, -1) + 0.5
     x, y = (part[np.hypot(x - 384, y - 384) < 384] for part in (x, y))
