@@ -130,8 +130,9 @@ class Picture:
     counts: Counts
 
     def rgb(self) -> NDArray[np.float16]:
-        """(H, W, 3) light."""
-        return np.stack([self.buffers[name] for name in "RGB"], axis=-1).reshape(*self.lit.shape, 3)
+        """(H, W, 3) light, a channel after another in memory."""
+        light = np.stack([self.buffers[name] for name in "RGB"]).reshape(3, *self.lit.shape)
+        return np.moveaxis(light, 0, -1)
 
 
 def draw_picture(show: Show, angle: float, side: int = 0) -> Picture:
