@@ -12,6 +12,7 @@ from quiltcli.geometry import FloatArray, dot, rotation_deg
 from quiltcli.ring.curve import Curve, User, overlapping
 from quiltcli.ring.elevation import plane_error
 from quiltcli.ring.maps import backward, forward
+from quiltcli.ring.plane import nodes_of, viewer_along
 from quiltcli.ring.rig import Pose, ideal_projector
 from tests.helpers.ring_scenes import rig
 
@@ -175,6 +176,20 @@ def test_a_curve_is_met_in_its_plane_on_the_far_side(aside: bool) -> None:
     still = backward(mirror, Curve(0.4, 1.0), x, y)
     same = backward(mirror, Curve(0.4, 1.0, (User(0.5, 0.4, 1.0, 0.1, 0.2),)), x, y)
     assert np.abs(still.viewer - same.viewer).max() < 1e-14
+
+
+@pytest.mark.parametrize("aside", [False, True])
+def test_angles_between_nodes_are_those_found_alone(aside: bool) -> None:
+    """Also of planes steeper than there are nodes for; to the last bits, whichever others are asked for."""
+    mirror, rng = pose(1.3, aside=aside), np.random.default_rng(4)
+    curve = Curve(0.4, 1.5, tuple(User(a, 0.1, 1.3, hold=0.1, blend=0.6) for a in (0.5, 1.4)))
+    nodes = nodes_of(mirror, curve)
+    b = np.concatenate((rng.uniform(-0.5, 0.5, 4000), [-0.7, 0.6, 0.5, -0.5]))
+    near = viewer_along(mirror, curve, b, nodes)
+    alone = viewer_along(mirror, curve, b)
+    assert np.abs(near - alone).max() < 1e-14
+    assert np.array_equal(viewer_along(mirror, curve, b[::7], nodes), near[:, ::7])
+    assert nodes_of(mirror, Curve(0.4, 1.0)) is None
 
 
 def test_curves_that_a_plane_meets_twice_are_found() -> None:
