@@ -225,6 +225,14 @@ class SceneFile(FileModel):
     background: Rgb = (0.0, 0.0, 0.0)
     """Colour where nothing is hit, linear."""
 
+    def cross_checks(self) -> Iterator[Complaint]:
+        """One sky is seen, and no colour in its place."""
+        seen = [k for k, light in enumerate(self.lights) if light.type == "environment" and light.visible]
+        for k in seen[1:]:
+            yield ("lights", k, "visible"), f"lights[{seen[0]}] is seen already (expected one sky at most)"
+        if seen and any(self.background):
+            yield ("background",), f"lights[{seen[0]}] is seen in its place (expected no such key beside it)"
+
     def without_shadows(self) -> SceneFile:
         """The same with lights that shine through everything."""
         return self._lit(light.model_copy(update={"shadows": False}) for light in self.lights)

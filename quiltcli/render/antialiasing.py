@@ -22,7 +22,7 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray, FloatArray
 from quiltcli.layout import Layout
-from quiltcli.render.buffers import Buffers
+from quiltcli.render.buffers import Buffers, background_of
 from quiltcli.render.setup import Stage
 from quiltcli.render.sums import Sums, new_sums
 from quiltcli.shading.aovs import shaded_for, wanted_for
@@ -73,7 +73,7 @@ def draw_samples(
     """
     sums, count = new_batch_sums(stage, batch, channels), stage.job.render.samples
     add_samples(stage, frame, batch, sums, sample_places(count))
-    sums.store(buffers, count, stage.scene.background)
+    sums.store(buffers, count, background_of(stage, frame.rays))
 
 
 def add_samples(

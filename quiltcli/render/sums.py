@@ -8,7 +8,7 @@ those that find none free are left out, as the channel could not hold them anywa
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from quiltcli.shading.aovs import light_at_points
 from quiltcli.shading.mattes import identities_of
 
 _ONE = np.float32(1)
+Background: TypeAlias = "Float32Array | Callable[[IntArray], Float32Array]"
 
 
 def summed(channels: tuple[str, ...]) -> tuple[str, ...]:
@@ -91,15 +92,13 @@ class Sums:
             if not pixel.size:
                 return
 
-    def store(
-        self, buffers: Buffers, count: int, background: Float32Array, part: slice | None = None
-    ) -> None:
+    def store(self, buffers: Buffers, count: int, background: Background, part: slice | None = None) -> None:
         """Write the means into the pixels of which any of `count` samples sees something.
 
         Args:
             buffers: written to.
             count: samples a pixel.
-            background: (3,) what the other samples see.
+            background: (3,) what the other samples see, or what gives it (3, P) at quilt addresses (P,).
             part: the only pixels that are looked at, from the first address on; None for all.
         """
         part = part or slice(0, self.size)
@@ -117,13 +116,20 @@ class Sums:
             values[pixel] = 0
 
     def _store_light(
-        self, buffers: Buffers, name: str, pixel: IntArray, count: int, background: Float32Array
+        self, buffers: Buffers, name: str, pixel: IntArray, count: int, background: Background
     ) -> None:
         seen: Float32Array = self._memory["cover"][pixel]
         whole = np.float32(count)
+        behind: Float32Array | None = None
+        if callable(background) and name == "rgba":
+            behind = np.zeros((3, pixel.size), dtype=np.float32)
+            some = np.flatnonzero(seen < whole)
+            behind[:, some] = background(pixel[some] + self._first)
         for k, layer in enumerate(CHANNELS[name].layers[:3]):
             values: Float32Array = self._memory[f"{name}.{k}"][pixel]
-            if name == "rgba":
+            if behind is not None:
+                values += (count - seen) * behind[k]
+            elif name == "rgba" and not callable(background):
                 values += (count - seen) * background[k]
             values /= whole
             self._put(buffers, layer, pixel, values)

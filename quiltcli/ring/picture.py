@@ -15,6 +15,7 @@ from quiltcli.channels import CHANNELS, MOST_HALF, empty_buffers
 from quiltcli.geometry import BoolArray, IntArray, slices
 from quiltcli.lightfield import Field
 from quiltcli.projection.gaze import Gaze
+from quiltcli.ring.cast import lines_of
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.hits import EYE, ring_hits
 from quiltcli.ring.outline import lit_pixels
@@ -24,6 +25,7 @@ from quiltcli.ring.rig import Pose, Rig
 from quiltcli.scene import Scene
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill, light_at_points
+from quiltcli.shading.sky import sky_at
 from quiltcli.viewer.viewer import Viewer
 
 _CHUNK = 16384
@@ -138,7 +140,7 @@ def draw_picture(show: Show, angle: float, side: int = 0) -> Picture:
     buffers, counts = empty_buffers(show.channels, lit.size), Counts()
     if show.field is not None:
         return Picture(pose, lit, buffers, _photographed(show, show.field, pose, lit, buffers))
-    _background(show, lit, buffers)
+    _background(show, pose, lit, buffers)
     several = len(show.samples) > 1
     light = tuple(name for name in show.channels if CHANNELS[name].averaged and several)
     rest = tuple(name for name in show.channels if name not in light)
@@ -163,8 +165,19 @@ def _photographed(
     return counts
 
 
-def _background(show: Show, lit: BoolArray, buffers: dict[str, NDArray[Any]]) -> None:
-    """The mirror shows the background's colour where it shows nothing else."""
+def _background(show: Show, pose: Pose, lit: BoolArray, buffers: dict[str, NDArray[Any]]) -> None:
+    """The mirror shows the background's colour, or the sky, where it shows nothing else."""
+    if show.scene.sky is not None and "rgba" in show.channels:
+        address = np.flatnonzero(lit)
+        row, column = np.divmod(address, lit.shape[1])
+        x, y = column + 0.5, row + 0.5
+        ways = [
+            np.ascontiguousarray(lines_of(pose, show.curve, x + dx, y + dy).along.T)
+            for dx, dy in ((0.0, 0.0), (-0.5, 0.0), (0.5, 0.0), (0.0, -0.5), (0.0, 0.5))
+        ]
+        colors = sky_at(show.scene.sky, ways[0], ways[2] - ways[1], ways[4] - ways[3])
+        for name, values in zip("RGB", np.minimum(colors, MOST_HALF), strict=True):
+            buffers[name][address] = values
     if not show.scene.background.any():
         return
     for name, value in zip("RGB", show.scene.background, strict=True):
@@ -206,7 +219,10 @@ def _samples(
         for k, (layer, total) in enumerate(zip(CHANNELS[name].layers, totals, strict=False)):
             values = total[pixel]
             if name == "rgba":
-                values += (count - share) * show.scene.background[k]
+                there = show.scene.background[k]
+                if show.scene.sky is not None:
+                    there = buffers[layer][pixel].astype(np.float32)
+                values += (count - share) * there
             buffers[layer][pixel] = np.minimum(values / count, MOST_HALF)
         if name == "rgba":
             buffers["A"][pixel] = share / count

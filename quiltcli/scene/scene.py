@@ -13,6 +13,7 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, c
 from quiltcli.scene.lights import Light
 
 if TYPE_CHECKING:
+    from quiltcli.scene.environment.sky import Sky
     from quiltcli.scene.materials import Texture
     from quiltcli.scene.textures.pool import Textures
 
@@ -82,6 +83,7 @@ class Scene:
         uv1: (V, 2) those of the second set, likewise.
         textures: the pictures that surfaces are covered with; None where there are none, and in a scene that
             was loaded to be looked into, not to be drawn.
+        sky: what is seen where nothing is hit instead of `background`; None for that.
     """
 
     vertices: FloatArray
@@ -105,6 +107,7 @@ class Scene:
     opacities: Float32Array | None = None
     uv1: FloatArray | None = None
     textures: Textures | None = None
+    sky: Sky | None = None
 
     @cached_property
     def named(self) -> Int32Array:

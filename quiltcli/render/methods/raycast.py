@@ -25,7 +25,7 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
 from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.batch import put_layers
-from quiltcli.render.buffers import Buffers, clear, lay_background
+from quiltcli.render.buffers import Buffers, background_of, clear, lay_background, lay_sky
 from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage
@@ -68,7 +68,8 @@ def cast_frame(
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
     sloped, normals = stage.scene.textures is not None, stage.scene.corner_normals
     clear(stage, buffers, only)
-    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers, rays)
+    blocks = np.flatnonzero(rays.lit[stage.blocks.facet])
+    lay_background(stage, blocks, buffers, rays)
 
     def draw(address: IntArray) -> int:
         address = address[lit_pixels(address, stage.layout, stage.owners, rays)]
@@ -86,6 +87,7 @@ def cast_frame(
 
     with ThreadPoolExecutor(threads) as pool:
         visible = sum(pool.map(draw, pixels_of(stage, rays.lit)))
+    lay_sky(stage, blocks, buffers, rays)
     return FrameRecord(
         frame=viewer.frame,
         triangles=int(np.count_nonzero(target.drawn)),
@@ -133,6 +135,7 @@ def cast_through(
     """Draw pixels that are seen through something; how many inside facets show the scene."""
     scene, channels = stage.scene, stage.job.output.channels
     assert scene.soft is not None
+    assert gaze.rays is not None
     light = np.ones(pixels.address.size, dtype=np.bool_)
     found = (
         LayerHits(
@@ -145,7 +148,7 @@ def cast_through(
     first, last = int(pixels.address[0]), int(pixels.address[-1])
     sums = Sums(new_sums(summed(channels), partial(np.zeros, last + 1 - first)), summed(channels), first)
     some = blended(found, light, scene, gaze.viewer.eye)
-    return put_layers(some, sums, buffers, channels, gaze, scene.background)
+    return put_layers(some, sums, buffers, channels, gaze, background_of(stage, gaze.rays))
 
 
 def ray_hits(
