@@ -23,7 +23,7 @@ class Texture:
 
     Attributes:
         role: what it varies: `color`, `emission`, `roughness`, `metallic`, `normal`, `occlusion`, and what
-            is not drawn: `opacity`, `bump`, …
+            is not drawn: `specular`, `displacement`, …
         picture: where its pixels come from.
         matrix: (2 · 3) row by row: u, v of the picture from the vertices' texture coordinates, both with
             v down from the picture's upper edge.
@@ -33,6 +33,7 @@ class Texture:
         gain: base and gain: values become base + gain · value.
         channel: r, g, b or a where the role takes one number; empty for the first.
         use: whose texture it is, for messages.
+        nearest: whether texels that are seen enlarged are squares of one colour.
     """
 
     role: str
@@ -44,6 +45,7 @@ class Texture:
     gain: tuple[float, float] = (0.0, 1.0)
     channel: str = ""
     use: str = field(default="", compare=False)
+    nearest: bool = False
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def textures_of(material: MaterialSpec) -> tuple[Texture, ...]:
             matrix=(su, 0.0, ou, 0.0, sv, 1.0 - sv - ov),
             uv_set=spec.uv_set,
             wrap=(spec.wrap, spec.wrap),
-            strength=spec.strength if role == "normal" else 1.0,
+            strength=spec.strength if role in ("normal", "bump") else 1.0,
             use=f"material.textures.{role}",
         )
         for role, path in spec.pictures().items()
