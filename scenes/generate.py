@@ -41,6 +41,9 @@ PALETTE = {
     "clay": (0.46, 0.19, 0.105),
     "dusk": (0.085, 0.14, 0.25),
     "street": (0.16, 0.16, 0.17),
+    "strut": (0.42, 0.43, 0.46),
+    "start": (0.02, 0.5, 0.05),
+    "goal": (0.62, 0.015, 0.012),
 } | {
     # The quarters of the city.
     f"quarter{k:02d}": (
@@ -349,9 +352,13 @@ MESHES: dict[str, Callable[[], Mesh]] = {
 
 
 def obj_text(name: str) -> str:
+    """One of `MESHES` as OBJ."""
+    return mesh_text(MESHES[name](), name)
+
+
+def mesh_text(mesh: Mesh, name: str, maker: str = "generate.py") -> str:
     """A mesh as OBJ, to a micrometre."""
-    mesh = MESHES[name]()
-    lines = [f"# {name}: made by generate.py, metres, Y up"]
+    lines = [f"# {name}: made by {maker}, metres, Y up"]
     if mesh.names:
         lines.append(f"mtllib {name}.mtl")
     lines += ["v " + " ".join(f"{round(c, 6) + 0.0:.6g}" for c in point) for point in mesh.vertices]
@@ -373,8 +380,14 @@ def mtl_text(name: str) -> str:
     """The materials a mesh uses, empty when it has none of its own."""
     names = set(MESHES[name]().names.values())
     plain = sorted(names & PALETTE.keys())
-    text = "".join(f"newmtl {m}\nKd {' '.join(map(str, PALETTE[m]))}\nNs 30\n" for m in plain)
-    return text + "".join(f"newmtl {m}\nKd 1 1 1\n{COVERED[m]}" for m in sorted(names & COVERED.keys()))
+    return palette_text(plain) + "".join(
+        f"newmtl {m}\nKd 1 1 1\n{COVERED[m]}" for m in sorted(names & COVERED.keys())
+    )
+
+
+def palette_text(names: Iterable[str]) -> str:
+    """Materials of the palette as MTL."""
+    return "".join(f"newmtl {m}\nKd {' '.join(map(str, PALETTE[m]))}\nNs 30\n" for m in names)
 
 
 def write(folder: Path, names: Iterable[str]) -> None:

@@ -18,7 +18,7 @@ from quiltcli.analysis.parallax import stereo_notices
 from quiltcli.display import Facets, load_display
 from quiltcli.display.check import called
 from quiltcli.display.clicks import calibrate
-from quiltcli.display.notices import display_notices
+from quiltcli.display.notices import display_notices, surface_notices
 from quiltcli.errors import Problem, QuiltError
 from quiltcli.formats.inputs import is_regular
 from quiltcli.formats.mesh.read import SUFFIXES
@@ -149,7 +149,8 @@ class _Findings:
         if path not in self.displays:
             found = self.run(load_display, self.run(load_display_file, path))
             self.displays[path] = found
-            self.notices += display_notices(found) if found is not None else ()
+            if found is not None:
+                self.notices += [*display_notices(found), *surface_notices(found)]
         return self.displays[path]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from quiltcli.charts.chart import Chart
 from quiltcli.charts.kinds import KINDS, OUTWARD, metres_by
+from quiltcli.charts.omni import MERGE_DEG, Omnistereo
 from quiltcli.charts.projections import FACES, cube_face
 from quiltcli.charts.projections import KINDS as PROJECTIONS
 from quiltcli.charts.shapes import Placed, Shape, slopes
@@ -86,12 +87,21 @@ def projection_charts(spec: Any, display: DisplayFile) -> list[tuple[str, Chart]
             mask=_defined(turned, spec.pixels),
             wraps=_wraps(turned),
             cuts=_cuts(spec),
+            omni=_omnistereo(spec),
             record=record_of(spec, display),
         )
 
     if spec.kind == "cubemap" and spec.layout == "pages":
         return [(name, chart(cube_face(spec, name))) for name in FACES]
     return [(spec.kind, chart(PROJECTIONS[spec.kind](spec)))]
+
+
+def _omnistereo(spec: Any) -> Omnistereo | None:
+    """The eyes beside the head that a projection asks for."""
+    if not getattr(spec, "omnistereo", False):
+        return None
+    first, last = np.radians(spec.pole_merge_deg or MERGE_DEG).tolist()
+    return Omnistereo((first, last))
 
 
 def _cuts(spec: Any) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -110,6 +120,8 @@ def record_of(spec: Any, display: DisplayFile) -> str:
     """A surface or a projection as JSON that does not depend on where its files lie, only on their bytes."""
     data = {"units": display.metres, **plain(spec, file_sha256)}
     data.pop("place", None)
+    if not data.get("omnistereo", True):
+        del data["omnistereo"]
     matrix = display.world_from_local
     if matrix is not None:
         data["world_from_local"] = matrix.tolist()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from quiltcli.charts.omni import Omnistereo
 from quiltcli.charts.shapes import Shape
 from quiltcli.geometry import BoolArray, FloatArray
 
@@ -26,6 +27,7 @@ class Chart:
         mask: (H, W) pixels that there are; None for all.
         wraps: whether the left and the right edge are the same line of the world.
         cuts: columns, and rows, at which the shape is broken.
+        omni: eyes beside the head, for a projection in which each direction has its own; None for one eye.
         record: the surface or the projection in words, JSON, for images and hashes.
     """
 
@@ -36,6 +38,7 @@ class Chart:
     mask: BoolArray | None = None
     wraps: bool = False
     cuts: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
+    omni: Omnistereo | None = None
     record: str = ""
 
     @property

@@ -72,3 +72,36 @@ def _steps(chart: Chart, x: FloatArray, y: FloatArray) -> tuple[FloatArray, Floa
         bend = np.fmax(bend, rate)
         found.append(step / (2 * h))
     return found[0], found[1], bend
+
+
+def pitch_ratio(chart: Chart) -> float:
+    """How many times farther apart the pixels of a surface are in some places than in others, or at poles."""
+    x, y = (np.clip(np.linspace(0, side, 33), 0.5, side - 0.5) for side in chart.size)
+    places = np.meshgrid(x, y)
+    known = np.ones(places[0].shape, dtype=np.bool_)
+    if chart.mask is not None:
+        known = chart.mask[places[1].astype(int), places[0].astype(int)]
+    most = 1.0
+    for step in _steps(chart, *places)[:2]:
+        length = np.sqrt((step**2).sum(axis=0))
+        length = length[known & np.isfinite(length) & (length > 0)]
+        if length.size:
+            most = max(most, float(length.max() / length.min()))
+    return most
+
+
+def seam_gap(chart: Chart) -> float | None:
+    """Pixels between the left and the right edge of a surface that nearly meet; None where they do not."""
+    width, height = chart.size
+    y = np.clip(np.linspace(0, height, 33), 0.5, height - 0.5)
+    left, right = (chart.points(np.full_like(y, x), y) for x in (0.5, width - 0.5))
+    beside = chart.points(np.full_like(y, 1.5), y)
+    with np.errstate(invalid="ignore"):
+        step = np.sqrt(((beside - left) ** 2).sum(axis=0))
+        away = np.sqrt(((right - left) ** 2).sum(axis=0))
+    known = np.isfinite(step + away) & (step > 0)
+    if width < 8 or not known.any():
+        return None
+    # Between centres of the outermost pixels there is one step where the edges meet.
+    gap = float(np.abs(away[known] / step[known] - 1).max())
+    return gap if gap < 2 and float((away[known] / step[known]).max()) < 3 else None

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from quiltcli.charts.shapes import Shape, Smooth
+from quiltcli.formats.mesh.freeform import FreeformPatch, read_freeform
 from quiltcli.geometry import FloatArray
 
 
@@ -20,6 +21,8 @@ def bezier_shape(spec: Any, metres: Callable[[Any], float]) -> Shape:
 
 def nurbs_shape(spec: Any, metres: Callable[[Any], float]) -> Shape:
     """The patch of rows of control points with weights and knots."""
+    if spec.file is not None:
+        return _freeform_shape(read_freeform(spec.file), metres(1.0))
     points = _points(spec.points, metres)
     rows, columns = points.shape[:2]
     weights = np.ones((rows, columns)) if spec.weights is None else np.array(spec.weights, dtype=np.float64)
@@ -29,7 +32,16 @@ def nurbs_shape(spec: Any, metres: Callable[[Any], float]) -> Shape:
             (columns, rows), spec.degree, (spec.knots_s, spec.knots_t), strict=True
         )
     ]
-    return _patch(points, weights, spec.degree, *knots)
+    return _patch(points, weights, spec.degree, knots[0], knots[1])
+
+
+def _freeform_shape(found: FreeformPatch, unit: float) -> Shape:
+    """The patch of a file, v upwards as textures have it: the first row is at the top."""
+    (first, last), (low, high) = found.ranges
+    along, down = found.knots
+    turned = (-down)[::-1] + 0.0
+    points, weights = unit * found.points[::-1], found.weights[::-1]
+    return _patch(points, weights, found.degree, along, turned, ((first, last), (-high, -low)))
 
 
 def _points(rows: Any, metres: Callable[[Any], float]) -> FloatArray:
@@ -49,17 +61,26 @@ def _even(count: int, degree: int) -> FloatArray:
 
 
 def _patch(
-    points: FloatArray, weights: FloatArray, degree: tuple[int, int], along: FloatArray, down: FloatArray
+    points: FloatArray,
+    weights: FloatArray,
+    degree: tuple[int, int],
+    along: FloatArray,
+    down: FloatArray,
+    ranges: tuple[tuple[float, float], tuple[float, float]] | None = None,
 ) -> Shape:
-    """The patch over the range between its outer knots, taken for 0 to 1."""
+    """The patch over ranges of its knots, between the outer ones by default, taken for 0 to 1."""
+    shares = [
+        _identity if ranges is None else _rescaled(knots, order, part)
+        for knots, order, part in zip((along, down), degree, ranges or ((0, 1), (0, 1)), strict=True)
+    ]
     weighted = np.concatenate((points * weights[..., None], weights[..., None]), axis=2)
 
     def at(s: FloatArray, t: FloatArray) -> FloatArray:
         shape = np.broadcast_shapes(np.shape(s), np.shape(t))
         # What broadcasts is worked out once: rows and columns of a block are far fewer than its pixels.
         total = np.zeros((4, *shape))
-        across = basis(along, degree[0], np.asarray(s, dtype=np.float64))
-        below = basis(down, degree[1], np.asarray(t, dtype=np.float64))
+        across = basis(along, degree[0], shares[0](np.asarray(s, dtype=np.float64)))
+        below = basis(down, degree[1], shares[1](np.asarray(t, dtype=np.float64)))
         for j in range(weighted.shape[0]):
             for i in range(weighted.shape[1]):
                 product = across[i] * below[j]
@@ -68,6 +89,19 @@ def _patch(
         return np.asarray(total[:3] / total[3])
 
     return Smooth(at)
+
+
+def _identity(share: FloatArray) -> FloatArray:
+    return share
+
+
+def _rescaled(
+    knots: FloatArray, degree: int, part: tuple[float, float]
+) -> Callable[[FloatArray], FloatArray]:
+    """Shares of a part of the range between the outer knots as shares of all of it."""
+    first, last = float(knots[degree]), float(knots[-degree - 1])
+    start, step = (part[0] - first) / (last - first), (part[1] - part[0]) / (last - first)
+    return lambda share: start + share * step
 
 
 def basis(knots: FloatArray, degree: int, share: FloatArray) -> list[FloatArray]:

@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from quiltcli.charts.grids import drawn_pixels
 from quiltcli.errors import DisplayError, Problem
+from quiltcli.formats.exr.image import read_header
 from quiltcli.formats.inputs import read_input
 from quiltcli.formats.numbers import read_numbers
 from quiltcli.geometry import FloatArray
+from quiltcli.job.projections import PlanarCamera
+
+CAMERA_ATTRIBUTE = "quilt:camera"
+"""Of an ST map: angle and aspect of the plain picture, as JSON."""
 
 
 def camera_directions(spec: Any, u: FloatArray, v: FloatArray) -> FloatArray:
     """Directions (3, ...) through places of a plain picture: u from the left, v from the bottom, 0 to 1."""
-    aspect = spec.camera.aspect or spec.pixels[0] / spec.pixels[1]
-    half = math.tan(math.radians(spec.camera.fov_deg) / 2)
+    camera = spec.camera or PlanarCamera.model_validate(_noted(spec.file))
+    aspect = camera.aspect or spec.pixels[0] / spec.pixels[1]
+    half = math.tan(math.radians(camera.fov_deg) / 2)
     x, y = (2 * u - 1) * (half * aspect), (2 * v - 1) * half
     return np.stack((x, y, np.where(np.isfinite(x + y), -1.0, np.nan)))
+
+
+def _noted(path: Path) -> dict[str, Any]:
+    """What a map's file says of its plain picture; nothing where it says nothing."""
+    if path.suffix.lower() != ".exr":
+        return {}
+    try:
+        found = json.loads(str(read_header(path).attributes.get(CAMERA_ATTRIBUTE, "{}")))
+    except ValueError:
+        return {}
+    return {key: value for key, value in found.items() if key in PlanarCamera.model_fields}
 
 
 def st_directions(spec: Any) -> FloatArray:

@@ -38,7 +38,10 @@ def compare(
 
     loaded = load_job(job, sets)
     options = CompareOptions(
-        frame, variants_of(methods), threads or 0, lambda name: click.echo(f"drawing {name}", err=True)
+        frame,
+        variants_of(methods) if methods else None,
+        threads or 0,
+        lambda name: click.echo(f"drawing {name}", err=True),
     )
     study = compare_methods(loaded, options)
     paths = write_comparison(study, output or loaded.output.directory / "compare")

@@ -17,7 +17,7 @@ from quiltcli.cli.printing import print_files
     "--format",
     "format_name",
     type=MAP_FORMAT,
-    help="obj, csv, json, mpcdi, mpcdi1, st, png or svg, whatever the suffix; of a display xyz, obj or data.",
+    help="obj, csv, json, mpcdi, mpcdi1, st, png or svg; of a display xyz, obj, data, st or mpcdi.",
 )
 @click.option("--display", type=PATH, help="Display file, instead of the one the layout names.")
 def export(layout: Path, output: Path, format_name: str | None, display: Path | None) -> None:
@@ -26,8 +26,9 @@ def export(layout: Path, output: Path, format_name: str | None, display: Path | 
     Textured mesh (.obj), table of panels (.csv), JSON (.json), MPCDI (.mpcdi), ST maps (.exr), or a
     template picture (.png, .svg).
 
-    LAYOUT may be a display file: its pixels' points in the world (.exr, .pfm), or a mesh whose texture is its
-    image (.obj); of a projection a warp mesh (.data). A file a facet.
+    LAYOUT may be a display file: its pixels' points in the world (.exr, .pfm, .mpcdi), or a mesh whose
+    texture is its image (.obj); of a projection a warp mesh (.data), or an ST map over a plain picture
+    (--format st). But for .mpcdi a file a facet.
     """
     from quiltcli.display import load_display
     from quiltcli.exchange.pixelmaps import known_display, write_display_map, write_map

@@ -11,7 +11,7 @@ from quiltcli.cli.options import MAP_FORMAT, PATH, SIZE
 
 @click.command("import")
 @click.argument("file", type=PATH)
-@click.option("-o", "--output", type=PATH, required=True, help="Layout file to write.")
+@click.option("-o", "--output", type=PATH, required=True, help="Layout file, or display file, to write.")
 @click.option(
     "--format", "format_name", type=MAP_FORMAT, help="obj, csv, json or mpcdi, whatever the suffix."
 )
@@ -26,11 +26,23 @@ def import_(
     size: tuple[int, int] | None,
     picture: Path | None,
 ) -> None:
-    """Make a layout from a pixel map: .obj, .csv, .json or .mpcdi."""
-    from quiltcli.exchange.pixelmaps import imported_map
+    """Make a layout from a pixel map: .obj, .csv, .json or .mpcdi.
+
+    An .mpcdi archive of the advanced 3D profile, or of shader lamps, says where pixels are in the world: of
+    such a one it makes a display file, with maps beside it.
+    """
+    from quiltcli.exchange.pixelmaps import holds_surfaces, imported_map, read_surfaces
     from quiltcli.layout import write_layout
     from quiltcli.layout.picture.picture import layout_picture
 
+    if format_name in (None, "mpcdi", "mpcdi1") and holds_surfaces(file):
+        if display is not None or size is not None or picture is not None:
+            raise click.UsageError("a display is made of this archive: no --display, --size or --picture")
+        made = read_surfaces(file, output)
+        for words in made.notices:
+            click.echo(words, err=True)
+        click.echo(f"{made.surfaces} surface{'s' * (made.surfaces > 1)} in {output}")
+        return
     layout, facets, notice = imported_map(file, display, size=size, format_name=format_name)
     if notice:
         click.echo(notice, err=True)

@@ -13,7 +13,7 @@ from quiltcli.cli.options import PATH, POINT, SIZE
 from quiltcli.errors import JobError
 
 if TYPE_CHECKING:
-    from quiltcli.exchange.newjob.kinds import Wishes
+    from quiltcli.exchange.newjob.wishes import Wishes
 
 
 @click.command()
@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 @click.option("--right", metavar="6x4.5m", help="Right wall of a corner.")
 @click.option("--angle", type=float, help="Degrees between the lit sides of a corner: 90, or 270 outside.")
 @click.option("--radius", metavar="6m", help="Radius of a curve; negative bends away from the viewer.")
-@click.option("--columns", type=int, help="Flat columns of a curve, cylinder or sphere.")
-@click.option("--rows", type=int, help="Rows of a sphere.")
+@click.option("--columns", type=int, help="Flat columns of a curve, cylinder, sphere or arena.")
+@click.option("--rows", type=int, help="Rows of a sphere, or of an arena's panels.")
 @click.option("--steps", type=int, help="Steps of stairs.")
+@click.option("--preset", metavar="G6_2x10", help="A known arena.")
+@click.option("--installed", type=int, help="Columns of an arena that are there; the gap is behind.")
 @click.option("--pitch", metavar="6mm", help="Distance from pixel to pixel.")
 @click.option("--pixels", metavar="1920x1080", help="Pixels of every panel, instead of a pitch.")
 @click.option("--cabinet", metavar="500x500mm/128x128px", help="Size and pixels of a cabinet.")
@@ -49,7 +51,8 @@ def new(kind: str | None, output: Path | None, listing: bool, **figures: Any) ->
 
     Figures that are missing are asked for on a terminal. --list names the kinds.
     """
-    from quiltcli.exchange.newjob.kinds import KINDS, Wishes
+    from quiltcli.exchange.newjob.kinds import KINDS
+    from quiltcli.exchange.newjob.wishes import Wishes
     from quiltcli.exchange.newjob.write import write_new_job
 
     if listing:

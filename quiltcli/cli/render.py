@@ -79,8 +79,12 @@ def render(
     loaded = load_job(job, sets)
     if loaded.ring is not None:
         if facets is not None or scheduler is not None:
-            raise click.UsageError("--facets and --scheduler are not for 360° light field displays")
-        _render_turns(loaded, frames, output, positions, resume, overwrite, threads or 0, dry_run, profile)
+            words = "a 360° light field display has no facets, and its turns are drawn by one machine's cores"
+            raise click.UsageError(f"--facets, --scheduler: {words} (--positions draws some of them)")
+        from quiltcli.render.ring.walk import RingOptions
+
+        how = RingOptions(frames, output, positions, resume, overwrite, threads or 0, dry_run, strict)
+        _render_turns(loaded, how, profile=profile)
         return
     if positions is not None:
         raise click.UsageError("--positions are a 360° light field display's, and this job's has facets")
@@ -122,24 +126,22 @@ def _render(job: Any, options: Any, scheduler: str | None, form: str) -> Any:
     return records
 
 
-def _render_turns(job: Any, *how: Any) -> None:
+def _render_turns(job: Any, options: Any, *, profile: bool) -> None:
     """Render turns of a spinning mirror, with a line a frame on stderr."""
     from quiltcli.render.interrupt import Stopped
-    from quiltcli.render.ring.walk import RingOptions, render_turns
+    from quiltcli.render.ring.walk import render_turns
 
-    frames, output, positions, resume, overwrite, threads, dry_run, profile = how
-    options = RingOptions(frames, output, positions, resume, overwrite, threads, dry_run)
     try:
         records = render_turns(job, options, lambda words: click.echo(words, err=True))
     except Stopped as stopped:
         click.echo(str(stopped), err=True)
         sys.exit(stopped.exit_code)
-    if dry_run:
+    if options.dry_run:
         click.echo("nothing is wrong with this job")
     elif not records:
         click.echo("every frame is complete already")
     else:
-        click.echo(f"written to {output or job.output.directory}")
+        click.echo(f"written to {options.folder or job.output.directory}")
     for record in records if profile else ():
         click.echo(f"frame {record.frame}: seconds by stage, then those of all workers by what they did")
         rows = [

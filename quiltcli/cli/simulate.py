@@ -44,6 +44,11 @@ from quiltcli.cli.stereo import MATRICES
 )
 @click.option("--glasses", type=click.Choice(MATRICES), help="Both eyes' pictures as one anaglyph.")
 @click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
+@click.option(
+    "--corrected/--uncorrected",
+    default=True,
+    help="Images that make up for the panels (corrections in the display file), or as if they did not.",
+)
 @click.option("--direct", type=PATH, help="Write the direct picture, as PNG.")
 @click.option("--heat-map", type=PATH, help="Write a picture of the errors, as PNG.")
 @click.option("--view", type=VIEW, default="aces", show_default=True, help="How light becomes colour.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from quiltcli.display.curved import joined, projection_facets, surface_facets
 from quiltcli.display.facets import Facets, places_of
 from quiltcli.display.notices import likely_unit
 from quiltcli.display.panels import panel_facets
+from quiltcli.display.points import point_facets
 from quiltcli.display.rasters import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
+from quiltcli.display.response import response_of
 from quiltcli.errors import DisplayError, Problem, first_of, raise_all
 from quiltcli.formats.mesh import PolygonMesh, read_mesh
 from quiltcli.formats.mesh.polygons import area_vectors
@@ -30,8 +33,16 @@ def load_display(spec: DisplayFile) -> Facets:
         MeshError: the mesh cannot be read.
         DisplayError: the mesh or the display file makes no facets; every problem found is in it.
     """
+    facets = _facets(spec)
+    response = response_of(spec, facets.charts, facets.count)
+    return facets if response is None else replace(facets, response=response)
+
+
+def _facets(spec: DisplayFile) -> Facets:
     if spec.projection is not None:
         return projection_facets(spec)
+    if spec.points is not None:
+        return point_facets(spec)
     if spec.mesh is None and spec.panels is None:
         return surface_facets(spec)
     flat = panel_facets(spec) if spec.mesh is None else build_facets(read_mesh(spec.mesh), spec)

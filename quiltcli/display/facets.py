@@ -11,6 +11,7 @@ import numpy as np
 
 from quiltcli.charts.chart import EDGE_ON, Chart
 from quiltcli.display.edges import SharedEdges, find_shared_edges
+from quiltcli.display.response import Response
 from quiltcli.errors import DisplayError, Problem
 from quiltcli.formats.mesh import polygons
 from quiltcli.formats.yaml.source import Source
@@ -44,6 +45,7 @@ class Places:
         corner: (n, 2) pixel x, y of the page.
         source: finds lines in the display file.
         keys: where in the file each facet's own entry stands.
+        page_size: width and height of the pages that the places are on; None where the file does not say.
     """
 
     facet: Int32Array
@@ -53,6 +55,7 @@ class Places:
     corner: Int32Array
     source: Source
     keys: Mapping[int, tuple[str | int, ...]]
+    page_size: tuple[int, int] | None = None
 
     def problem(self, key: Sequence[str | int], message: str) -> Problem:
         """A problem with the place of a facet: the key begins with `facets` and its id."""
@@ -106,6 +109,7 @@ class Facets:
         places: facets whose place in the quilt the display file gives; None when it gives none.
         charts: of F facets those of curved ones, None for flat ones; empty where all are flat. A curved
             facet's corners, origin and steps are those of a rectangle that stands for it.
+        response: what the panels make of their images; None where they show them as they are.
     """
 
     names: tuple[str, ...]
@@ -123,6 +127,7 @@ class Facets:
     path: str
     places: Places | None = None
     charts: tuple[Chart | None, ...] = ()
+    response: Response | None = None
 
     @property
     def curved(self) -> BoolArray:
@@ -157,11 +162,16 @@ class Facets:
         return digest.hexdigest()
 
 
-def demand_flat(facets: Facets, what: str) -> None:
-    """Raise a DisplayError where a display has curved facets, for something that is for flat ones."""
-    if facets.curved.any():
-        words = f"{what} is for flat facets, and this display has curved ones"
-        raise DisplayError(Problem(f"{words} (quilt facet cuts a surface into flat ones)", facets.path))
+def demand_place(facets: Facets, what: str) -> None:
+    """Raise a DisplayError where a display is a projection, for something that asks where a display is."""
+    if any(chart is not None and not chart.stands for chart in facets.charts):
+        words = f"{what} is for displays that stand in the world, and this projection goes along with the eye"
+        raise DisplayError(Problem(words, facets.path))
+
+
+def eyes_apart(facets: Facets) -> bool:
+    """Whether pixels of a facet have eyes of their own, beside the head."""
+    return any(chart is not None and chart.omni is not None for chart in facets.charts)
 
 
 def display_points(facets: Facets) -> FloatArray:

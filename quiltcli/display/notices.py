@@ -6,12 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from quiltcli.charts.measure import pitch_ratio, seam_gap
 from quiltcli.display.check import called
 from quiltcli.display.facets import Facets, pitch_mm, shared_edges
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, dot, next_in_row, offsets, segments
 
 _WIDEST = 200.0  # metres; the largest screens are half as wide
 _MOST_PAIRS = 5
+_CROWDED = 20.0  # times as dense as elsewhere
 
 
 def display_notices(facets: Facets) -> Iterator[str]:
@@ -36,6 +38,26 @@ def display_notices(facets: Facets) -> Iterator[str]:
     if extent > _WIDEST:
         unit = likely_unit(extent)
         yield f"the display is {extent:.4g} m large: is its mesh in another unit (units: {unit}?)"
+
+
+def surface_notices(facets: Facets) -> Iterator[str]:
+    """Sentences about surfaces: pixels that crowd, as at poles, and edges that nearly meet."""
+    for facet, chart in enumerate(facets.charts):
+        if chart is None or not chart.stands:
+            continue
+        name = f"{facets.path}: {called(facet, facets.names)}"
+        ratio = pitch_ratio(chart)
+        if ratio > _CROWDED:
+            yield (
+                f"{name}: pixels are up to {ratio:,.0f} times closer together in some places than in others,"
+                " as at a pole: pixels per metre say little there"
+            )
+        gap = seam_gap(chart)
+        if gap is not None and not chart.wraps:
+            yield (
+                f"{name}: the left and the right edge are {gap:.2g} pixels apart but do not meet:"
+                " what is looked up between pixels does not go on across them"
+            )
 
 
 def likely_unit(metres: float) -> str:

@@ -21,6 +21,7 @@ from quiltcli.job import JobFile, job_sha256
 from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.interrupt import stop_between_frames
+from quiltcli.render.methods import corrected
 from quiltcli.render.outputs import Drawn, outputs, refuse_to_overwrite, view_lit, write_settings
 from quiltcli.render.report import Clock, FrameRecord
 from quiltcli.render.resume import clear_away
@@ -77,7 +78,8 @@ def prepare_made(job: JobFile, options: MadeOptions, word: str) -> Prepared:
     frames = list(job.frames if options.frames is None else options.frames)
     stage = set_stage(job, options.folder)
     views = stage.views(frames)
-    out = replace(outputs(stage, options.folder, job_sha256(job)), besides={"quilt:made": word})
+    out = outputs(stage, options.folder, job_sha256(job))
+    out = replace(out, besides=out.besides | {"quilt:made": word})
     if not options.overwrite:
         refuse_to_overwrite(stage, out, views)
     return Prepared(stage, out, tuple(views), None)
@@ -119,7 +121,8 @@ def write_made(
                 clock = Clock()
                 with clock.stage("fill"):
                     made = fill(one.view, one.buffers)
-                records.append(_record(stage, one.view, made, clock.seconds))
+                record = _record(stage, one.view, made, clock.seconds)
+                records.append(corrected(stage, one.view, one.buffers, record, threads, None))
             writer.take(records, drawn)
         writer.leave(0)
         request.check()

@@ -62,14 +62,14 @@ def flatten_display(display: Path, output: Path, error: float, most: int = MOST)
         output,
         f"# {len(pieces.faces):,} flat facets of {display.name}, at most {pieces.error:.3g} pixels off\n"
         f"quilt_display: 1\nmesh: {json.dumps(mesh.name)}\n"
-        f"resolution: {{pixels_per_metre: {_density(pieces, chart.size):.6g}}}\n"
-        f"layout: {{from_uv: true, size: {size}}}\n",
+        f"layout: {{from_uv: true, size: {size}}}\n"
+        f"# beside another layout: resolution: {{pixels_per_metre: {_density(pieces, chart.size):.6g}}}\n",
     )
     return Flattened((output, mesh), len(pieces.faces), pieces.error)
 
 
 def _density(pieces: FlatPieces, size: tuple[int, int]) -> float:
-    """Pixels a metre, about; rasters come from the texture coordinates."""
+    """Pixels a metre, about, for who packs the facets anew."""
     extent = float(np.nanmax(np.ptp(pieces.points, axis=0)))
     return max(size) / extent
 

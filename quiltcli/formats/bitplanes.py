@@ -24,6 +24,8 @@ PLANES = 24
 """Pictures of one bit in a packed one."""
 ORDERS = tuple("".join(order) for order in permutations("rgb"))
 """Channels in the order in which they are shown."""
+STREAMS = ("red", "green", "blue")
+"""Colours of a projector of three chips, which are sent pictures of their own."""
 BITS = ("lsb", "msb")
 """Which bit of a channel is shown first: the least or the most significant one."""
 _END: dict[str, Literal["little", "big"]] = {"lsb": "little", "msb": "big"}
@@ -62,9 +64,15 @@ def unpack(packed: Packed, order: str = "rgb", first: str = "lsb") -> BoolArray:
     return planes.reshape(-1, height, width)
 
 
-def packed_name(number: int) -> str:
-    """Name of a packed picture's file; they are numbered from 1 through a whole job."""
-    return f"dvi.{number:08d}.png"
+def packed_name(number: int, stream: str = "") -> str:
+    """Name of a packed picture's file; those of a stream are numbered from 1 through a whole job."""
+    return f"dvi{stream and '_' + stream}.{number:08d}.png"
+
+
+def stream_of(name: str) -> str:
+    """The stream that a packed picture's file is of, by its name; empty where there is but one."""
+    stream = name.split(".")[0].removeprefix("dvi_")
+    return stream if stream in STREAMS else ""
 
 
 def write_packed(path: Path, packed: Packed) -> None:

@@ -61,11 +61,6 @@ FOREIGN = (
     *(
         ".fbx",
         ".blend",
-        ".abc",
-        ".usd",
-        ".usda",
-        ".usdc",
-        ".usdz",
         ".dae",
         ".3ds",
         ".max",

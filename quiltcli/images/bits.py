@@ -7,19 +7,19 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from quiltcli.errors import OutputError, Problem, raise_all
-from quiltcli.formats.bitplanes import BITS, ORDERS, PLANES, read_packed, unpack, write_plane
+from quiltcli.formats.bitplanes import BITS, ORDERS, PLANES, read_packed, stream_of, unpack, write_plane
 from quiltcli.formats.whole import make_folder
 
 _NUMBERED = re.compile(r".*?(\d{1,12})")
 
 
-def packed_files(named: Sequence[Path]) -> list[tuple[int, Path]]:
-    """Packed pictures by number: those named, and those in folders that are named.
+def packed_files(named: Sequence[Path]) -> list[tuple[str, int, Path]]:
+    """Packed pictures by stream and number: those named, and those in folders that are named.
 
     Raises:
-        OutputError: a folder without any, a name without a number, or a number that comes twice.
+        OutputError: a folder without any, a name without a number, or a number that comes twice in a stream.
     """
-    found: dict[int, Path] = {}
+    found: dict[tuple[str, int], Path] = {}
     problems: list[Problem] = []
     for path in named:
         inside = sorted(path.glob("*.png")) if path.is_dir() else [path]
@@ -32,16 +32,17 @@ def packed_files(named: Sequence[Path]) -> list[tuple[int, Path]]:
             if match is None or int(match[1]) < 1:
                 words = "has no number from 1 in its name, such as dvi.00000001.png"
                 problems.append(Problem(words, file=str(file)))
-            elif found.setdefault(int(match[1]), file) != file:
-                words = f"has the number of {found[int(match[1])]}"
-                problems.append(Problem(words, file=str(file)))
+                continue
+            key = stream_of(file.name), int(match[1])
+            if found.setdefault(key, file) != file:
+                problems.append(Problem(f"has the number of {found[key]}", file=str(file)))
     raise_all(OutputError, problems)
-    return sorted(found.items())
+    return [(*key, found[key]) for key in sorted(found)]
 
 
-def plane_path(out: Path, number: int) -> Path:
-    """File of the picture of one bit that is shown as the `number`th, from 1."""
-    return out / f"bits.{number:08d}.png"
+def plane_path(out: Path, number: int, stream: str = "") -> Path:
+    """File of the picture of one bit that is shown as the `number`th of a stream, from 1."""
+    return out / f"bits{stream and '_' + stream}.{number:08d}.png"
 
 
 def unpack_files(
@@ -63,15 +64,15 @@ def unpack_files(
     """
     raise_all(OutputError, _wrong(order, bits))
     files = packed_files(named)
-    places = {number: [plane_path(out, k) for k in _shown(number)] for number, _ in files}
+    places = {path: [plane_path(out, k, stream) for k in _shown(number)] for stream, number, path in files}
     if not overwrite:
         taken = [path for row in places.values() for path in row if path.exists()]
         wanted = "exists already, expected to be told to overwrite it"
         raise_all(OutputError, [Problem(wanted, file=str(path)) for path in taken])
-    for number, path in files:
+    for path in places:
         planes = unpack(read_packed(path)[None], order, bits)
         make_folder(out)  # only now: a damaged picture leaves no empty folder
-        for place, plane in zip(places[number], planes, strict=True):
+        for place, plane in zip(places[path], planes, strict=True):
             write_plane(place, plane)
     return [path for row in places.values() for path in row]
 

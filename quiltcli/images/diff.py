@@ -85,12 +85,14 @@ class FileDiff:
         code: exit code 0 to 4, as in `VERDICTS`.
         message: what kept the files from being compared, empty when they were.
         channels: one row for each channel of each part.
+        note: what explains differences, empty where nothing is known to.
     """
 
     name: str
     code: int
     message: str
     channels: tuple[ChannelDiff, ...]
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -168,7 +170,17 @@ def diff_files(a: Path, b: Path, limits: Limits | None = None, *, name: str = ""
         verdict, rows = diff_channels(*_same_window(image_a, image_b), limits, part)
         code = max(code, verdict)
         channels += rows
-    return FileDiff(name, code, "", tuple(channels))
+    return FileDiff(name, code, "", tuple(channels), _corrections_differ(parts_a[0], parts_b[0]))
+
+
+def _corrections_differ(a: Image, b: Image) -> str:
+    """What tells the light of two images apart where they were made for panels of another response."""
+    first, second = (image.attributes.get("quilt:corrections") for image in (a, b))
+    if first == second:
+        return ""
+    if first and second:
+        return "made for panels of other corrections"
+    return f"only the {'first' if first else 'second'} is corrected for its panels"
 
 
 def _shape_difference(a: Sequence[Image], b: Sequence[Image]) -> str:
@@ -318,6 +330,8 @@ def diff_rows(result: DiffResult) -> list[tuple[str, ...]]:
             counts = (str(row.over), str(row.nonfinite), first)
             verdict = VERDICTS[row.code]
             rows.append((file.name, str(row.part), row.channel, verdict, *figures, *counts))
+        if file.note:
+            rows.append((file.name, "", "", "", file.note, "", "", "", "", ""))
         if file.channels and file.code > max(row.code for row in file.channels):
             # Shares of pixels are those of all channels together.
             rows.append((file.name, "", "together", VERDICTS[file.code], "", "", "", "", "", ""))

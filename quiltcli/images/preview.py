@@ -206,6 +206,28 @@ def preview_paths(images: Sequence[Path], output: Path, kind: str | None = None)
     return [(images[0], output)]
 
 
+def domemaster_paths(images: Sequence[Path], folder: Path, name: str) -> list[tuple[Path, Path]]:
+    """Every image with the picture of a planetarium's sequence that it becomes: NAME_000001.png and so on.
+
+    Raises:
+        OutputError: an image has no frame number, or two have the same.
+    """
+    if folder.suffix.lower() in (*FORMATS, *_OTHER_PICTURES) and not folder.is_dir():
+        raise OutputError(Problem("is a picture's name (expected a folder for a sequence)", str(folder)))
+    if not name or Path(name).name != name:
+        raise OutputError(f"--domemaster: expected a name for the sequence, got {name!r}")
+    make_folder(folder)
+    pairs, seen = [], set()
+    for image in _every_frame(images):
+        match = _LAST_NUMBER.fullmatch(image.stem)
+        if match is None or int(match[1]) in seen:
+            words = "has no frame number" if match is None else f"is a second image of frame {int(match[1])}"
+            raise OutputError(Problem(f"{words} (expected a sequence such as page_01.####.exr)", str(image)))
+        seen.add(int(match[1]))
+        pairs.append((image, folder / f"{name}_{int(match[1]):06d}.png"))
+    return pairs
+
+
 def _numbered(output: Path, image: Path) -> Path:
     """The picture of an image of a sequence: `#` in its name becomes the image's number."""
     match = _LAST_NUMBER.fullmatch(image.stem)

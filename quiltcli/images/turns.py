@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import OutputError, Problem
-from quiltcli.formats.bitplanes import PLANES, read_packed, unpack
+from quiltcli.formats.bitplanes import PLANES, STREAMS, read_packed, stream_of, unpack
 from quiltcli.formats.inputs import read_input
 from quiltcli.geometry import BoolArray
 from quiltcli.images.preview import Bytes, block_means, srgb
@@ -68,14 +68,21 @@ def _of_turn(
     """Labels and pictures of some of the positions, from 1, that are drawn in packed pictures."""
     packing, turn = display.packing, display.rotation
     sign = -1 if turn.direction == "decreasing" else 1
-    shown = [(position, name) for name in sorted(drawn) for position in drawn[name]]
+    # The streams of a picture have names of the same end, and positions that all of them show.
+    streams: dict[str, list[str]] = {}
+    for name in sorted(drawn, key=lambda name: [*("", *STREAMS)].index(stream_of(name))):
+        streams.setdefault(name.split(".", 1)[1], []).append(name)
+    common = {end: set.intersection(*(set(drawn[n]) for n in names)) for end, names in streams.items()}
+    shown = [(position, end) for end in sorted(streams) for position in sorted(common[end])]
     read: tuple[str, BoolArray] | None = None
-    for position, name in shown[:: max(math.ceil(len(shown) / MOST), 1)]:
-        if read is None or read[0] != name:
-            read = name, unpack(read_packed(out / "packed" / name)[None], packing.order, packing.bits)
-        bits = read[1][(position - 1) % PLANES]
+    for position, end in shown[:: max(math.ceil(len(shown) / MOST), 1)]:
+        if read is None or read[0] != end:
+            packed = np.stack([read_packed(out / "packed" / name) for name in streams[end]])
+            planes = unpack(packed, packing.order, packing.bits)
+            read = end, planes.reshape(len(packed), PLANES, *planes.shape[1:])
+        bits = np.moveaxis(read[1][:, (position - 1) % PLANES], 0, -1)
         factor = max(math.ceil(max(bits.shape) / width), 1)
-        small = srgb(block_means(bits[..., None].astype(np.float32), factor))
+        small = srgb(block_means(bits.astype(np.float32), factor))
         angle = turn.first_deg + sign * 360 * (position - 1) / turn.positions
-        picture = np.rint(255 * small).astype(np.uint8).repeat(3, axis=2)
+        picture = np.rint(255 * small).astype(np.uint8).repeat(3 // small.shape[2], axis=2)
         yield f"{position}, {angle:.4g} DEG, frame {frame}", picture

@@ -12,6 +12,7 @@ from typing import Any
 from quiltcli.formats.gltf.container import files_beside
 from quiltcli.formats.mesh.mtl import read_mtl
 from quiltcli.formats.noted import note_digest, note_input, noted_digest
+from quiltcli.formats.usd import SUFFIXES
 from quiltcli.job.dump import plain
 from quiltcli.job.job import JobFile
 from quiltcli.job.layout import PackSpec
@@ -45,6 +46,8 @@ def job_sha256(job: JobFile) -> str:
         del data["render"]["scale"]  # what there was before there was this key
     else:
         data["layout"] = "packed anew"
+    if job.render.corrections:
+        del data["render"]["corrections"]  # likewise
     del data["frames"], data["render"]["texture_memory"]
     data["output"] = {key: data["output"][key] for key in ("channels", "compression", "data_window")}
     return _text_sha256(data)
@@ -120,6 +123,10 @@ def _drawn_in(path: Path) -> Iterator[Path]:
     suffix = path.suffix.lower()
     if suffix in (".gltf", ".glb"):
         yield from files_beside(path)
+    if suffix in SUFFIXES:
+        from quiltcli.formats.usd.stage import files_beside as files_of_stage
+
+        yield from files_of_stage(path)
     if suffix == ".obj":
         for name in _named(path, rb"mtllib"):
             yield path.parent / name

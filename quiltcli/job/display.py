@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainValidator, WithJsonSchema
 
 from quiltcli import geometry
+from quiltcli.job.corrections import CorrectionsSpec
 from quiltcli.job.layout import UvLayoutSpec
 from quiltcli.job.lengths import UNITS, Coordinate, Length, UpAxis, exact_metres, read_length, up_matrix
 from quiltcli.job.model import (
@@ -33,6 +34,7 @@ from quiltcli.job.model import (
     one_of,
 )
 from quiltcli.job.places import PlaceOnPage, Quarter
+from quiltcli.job.points import PointsSpec
 from quiltcli.job.projections import ProjectionSpec
 from quiltcli.job.surfaces import SurfaceSpec
 
@@ -214,6 +216,8 @@ class DisplayFile(FileModel):
     """Flat rectangles instead of a mesh; every panel is one facet, in this order."""
     surfaces: Annotated[tuple[SurfaceSpec, ...], Listed, Field(min_length=1)] | None = None
     """Curved surfaces, instead of a mesh or panels or beside them; each is one facet, after the others."""
+    points: PointsSpec | None = None
+    """Single lights, instead of a mesh, panels or surfaces; each is a facet of one pixel."""
     projection: ProjectionSpec | None = None
     """A picture around the eye that goes along with it, instead of anything that stands in the world."""
     units: Units = "m"
@@ -229,6 +233,8 @@ class DisplayFile(FileModel):
     """What is different on single facets, by facet id."""
     transform: TransformSpec | None = None
     """Place of the display in the world."""
+    corrections: CorrectionsSpec | None = None
+    """What the panels make of their images, which the images make up for."""
     layout: UvLayoutSpec | None = None
     """Take the layout from the texture coordinates of the mesh."""
 
@@ -249,6 +255,9 @@ class DisplayFile(FileModel):
         """A mesh or panels, each with keys of its own; a mirrored display would be lit on the wrong side."""
         if self.projection is not None:
             yield from self._beside_projection()
+            return
+        if self.points is not None:
+            yield from self._beside_points()
             return
         if self.mesh is None and self.panels is None and self.surfaces is None:
             words = "missing key (polygon mesh; or panels: flat rectangles; or surfaces; or a projection)"
@@ -282,13 +291,28 @@ class DisplayFile(FileModel):
 
     def _beside_projection(self) -> Iterator[Complaint]:
         """A projection is all of its display, and stands nowhere in the world."""
-        for name in ("mesh", "panels", "surfaces", "resolution", "transform", "layout"):
+        for name in ("mesh", "panels", "surfaces", "points", "resolution", "transform", "layout"):
             if getattr(self, name) is not None:
                 yield (name,), "cannot stand beside projection (a projection is the whole display)"
         if self.facets:
             yield ("facets",), "cannot stand beside projection (a projection is the whole display)"
         if self.viewing_side != "front":
             yield ("viewing_side",), f"cannot stand beside projection, got {self.viewing_side}"
+
+    def _beside_points(self) -> Iterator[Complaint]:
+        """Points are all of their display, and are lit to all sides."""
+        for name in ("mesh", "panels", "surfaces", "resolution", "layout"):
+            if getattr(self, name) is not None:
+                yield (name,), "cannot stand beside points (points are the whole display, a pixel each)"
+        if self.facets:
+            yield ("facets",), "cannot stand beside points (points are the whole display, a pixel each)"
+        if self.viewing_side == "back":
+            yield (
+                ("viewing_side",),
+                "expected no such key beside points (lit to all sides), got back",
+            )
+        if self.transform is not None and np.linalg.det(self.transform.array[:3, :3]) < 0:
+            yield ("transform",), "mirrors the display (its determinant is negative)"
 
     def _surfaces_alone(self) -> Iterator[Complaint]:
         """What only a mesh or panels can have."""

@@ -24,3 +24,6 @@ class HalftoneSpec(Model):
     coarser by it, and the first pictures of a turn are off: 0 is best as a rule."""
     compensate: Annotated[str, OneOf(COMPENSATIONS)] = "none"
     """Whether pixels that dwell longer on a viewer get darker tones: none, or dwell."""
+    before: bool = False
+    """Whether photographs of a light field become bits before they are rearranged, and their pixels are
+    copied then, to compare with: dots are torn apart by it."""

@@ -47,7 +47,11 @@ from quiltcli.job.names import NamesSpec
 from quiltcli.job.ring import RingSpec
 from quiltcli.job.viewer import FrameRange, ViewerSpec
 
-METHODS = ("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap", "tessellate")
+UNSORTED = ("octree", "independent")
+METHODS = (
+    *("homography", "offaxis", "raskar", "zscale", "twopass", "raycast", "cubemap", "tessellate"),
+    *UNSORTED,
+)
 RING_METHODS = ("exact", "raycast", "vertex")
 DEPTH_BITS = ("16", "24", "32f")
 LOSSLESS = ("none", "rle", "zips", "zip", "piz", "zstd", "htj2k32", "htj2k256")
@@ -189,6 +193,9 @@ class RenderSpec(Model):
     texture_memory: Annotated[float, Field(gt=0, le=1_000_000)] = 4096.0
     """Memory that all textures may take together, megabytes."""
 
+    corrections: bool = True
+    """Make up for what the display file says of its panels (corrections)."""
+
     scale: Annotated[
         Fraction,
         PlainValidator(_scale),
@@ -204,7 +211,7 @@ class RenderSpec(Model):
 
     def needs_planar_clip(self, channels: Sequence[str]) -> bool:
         """Whether something is asked for that lies between a near and a far plane."""
-        by_distance = ("homography", "raycast", "cubemap", "tessellate", *RING_METHODS)
+        by_distance = ("homography", "raycast", "cubemap", "tessellate", *UNSORTED, *RING_METHODS)
         return "zv" in channels or self.depth_bits is not None or self.method not in by_distance
 
     def cross_checks(self) -> Iterator[Complaint]:
@@ -226,7 +233,7 @@ class RenderSpec(Model):
             yield ("depth_bits",), "a cube map has exact depth (expected no such key beside method: cubemap)"
         if self.method == "raycast" and self.samples > 1:
             yield ("samples",), f"expected 1 beside method: raycast, one ray a pixel, got {self.samples}"
-        if self.method in ("raycast", "twopass") and self.shutter:
+        if self.method in ("raycast", "twopass", *UNSORTED) and self.shutter:
             yield ("shutter",), f"expected 0 beside method: {self.method}, got {self.shutter:g}"
 
 
@@ -356,6 +363,8 @@ class JobFile(FileModel):
             if method in ("exact", "vertex"):
                 yield ("render", "method"), f"expected {either(METHODS)} beside viewer, got {method}"
             return
+        if self.halftone is not None and self.halftone.before and self.lightfield is None:
+            yield ("halftone", "before"), "is for photographs (expected `lightfield` and no scene beside it)"
         if "method" in self.render.model_fields_set and method not in RING_METHODS:
             yield ("render", "method"), f"expected {either(RING_METHODS)} beside ring, got {method}"
         if self.layout is not None:
@@ -398,7 +407,7 @@ class JobFile(FileModel):
     layout: LayoutChoice | None = None
     """Layout file, or how to pack; the display's own layout or the packing defaults when absent."""
     scene: ScenePath
-    """Scene file, or a mesh or glTF file."""
+    """Scene file, or a mesh, glTF or USD file."""
     lightfield: YamlPath | None = None
     """Light field file, photographs for a 360° light field display to show, instead of `scene`."""
     frames: FrameRange

@@ -148,12 +148,12 @@ class EnvironmentLight(Model):
 
 
 class FileLights(Model):
-    """The lights in the objects' mesh files (glTF), each where its object is."""
+    """The lights in the objects' mesh files (glTF, USD), each where its object is."""
 
     type: Literal["file"] = "file"
     """Kind of light."""
     scale: NotNegative = 1.0
-    """Factor of their strength: 1 takes lux and candela by 683 lumens a watt, as exporters make them."""
+    """Factor of their strength: 1 takes glTF's lux and candela by 683 lumens a watt, USD's as they are."""
     shadows: bool = False
     """Whether what stands in their way casts a shadow."""
 

@@ -176,13 +176,18 @@ class MirrorDisplayFile(FileModel):
     """How pictures are sent."""
     sides: Annotated[tuple[SideSpec, ...], Listed, Field(min_length=2, max_length=2)] | None = None
     """Two planes back to back; one mirror through the middle when absent."""
+    filters: Annotated[str, OneOf(("rgb",))] | None = None
+    """`rgb` for a projector of three chips with pictures of their own; one stream of pictures when absent."""
 
     def cross_checks(self) -> Iterator[Complaint]:
-        """Two sides look away from one another; the mirror is within what the projector reaches."""
+        """Two sides look away from one another; colours come one way; the projector reaches the mirror."""
         if self.sides is not None:
             apart = (self.sides[1].azimuth_deg - self.sides[0].azimuth_deg) % 360
             if abs(apart - 180) > 1e-9:
                 yield ("sides", 1, "azimuth_deg"), f"must be 180 from the first side's, got {apart:g}"
+            tinted = [side.filter for side in self.sides if side.filter != (1.0, 1.0, 1.0)]
+            if self.filters and tinted:
+                yield ("filters",), "cannot stand beside filters of sides (expected one or the other)"
         if wrong := self.timing.fault(self.packing.rpm):
             yield ("packing", "rpm"), wrong
         height = self.projector.height

@@ -292,9 +292,10 @@ def nearest_file(path: Path) -> str:
     return f" (did you mean {near!r}?)" if near else ""
 
 
-MESHES = (".obj", ".ply", ".off", ".stl", ".glb", ".gltf")
+DISPLAY_MESHES = (".obj", ".ply", ".off", ".stl", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
+MESHES = (*DISPLAY_MESHES, ".abc")
 YAMLS = (".yaml", ".yml")
-MeshPath = Annotated[Path, ExistingFile(MESHES, "a mesh")]
+MeshPath = Annotated[Path, ExistingFile(DISPLAY_MESHES, "a mesh")]
 YamlPath = Annotated[Path, ExistingFile(YAMLS, "a YAML file")]
 ScenePath = Annotated[Path, ExistingFile(YAMLS + MESHES, "a scene")]
 AnyPath = Annotated[Path, BeforeValidator(located)]

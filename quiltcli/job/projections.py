@@ -26,6 +26,7 @@ from quiltcli.job.tagged import tagged
 
 FISHEYES = ("equidistant", "equisolid", "stereographic", "orthographic", "polynomial")
 Fov = Annotated[Number, Field(gt=0, le=360)]
+Latitude = Annotated[Number, Field(ge=0, le=90)]
 Flat = Annotated[Number, Field(gt=0, lt=180)]
 
 
@@ -64,11 +65,19 @@ class EquirectProjection(ProjectionBase):
     """Longitudes of the left and the right edge, 0 ahead and positive to the right, degrees."""
     latitude_deg: Annotated[tuple[Degrees, Degrees], Items(2, "degrees, bottom and top")] = (-90.0, 90.0)
     """Latitudes of the lower and the upper edge, degrees."""
+    omnistereo: bool = False
+    """Give each column an eye of its own, beside the head as for who looks that way; for two eyes."""
+    pole_merge_deg: Annotated[tuple[Latitude, Latitude], Items(2, "degrees, from and to")] | None = None
+    """Latitudes between which the eyes of omnistereo come together; 60 to 75 when absent, degrees."""
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Ranges that are some."""
         yield from not_empty(self, "longitude_deg", "latitude_deg")
         yield from in_range(self, "latitude_deg", -90, 90)
+        if self.pole_merge_deg is not None and not self.omnistereo:
+            yield ("pole_merge_deg",), "belongs to omnistereo: true"
+        if self.pole_merge_deg is not None and self.pole_merge_deg[0] > self.pole_merge_deg[1]:
+            yield ("pole_merge_deg",), "expected the lower latitude first"
 
 
 class FisheyeProjection(ProjectionBase):
@@ -159,8 +168,8 @@ class StProjection(ProjectionBase):
     """Kind of projection."""
     file: Annotated[Path, ExistingFile(MAPS, "an ST map")]
     """EXR or PFM of as many pixels: x in R and y from the bottom in G, 0 to 1; NaN shows nothing."""
-    camera: PlanarCamera = Field(default_factory=PlanarCamera)
-    """The plain picture."""
+    camera: PlanarCamera | None = None
+    """The plain picture; when absent what the file says, as those of quilt export do, else of 60 degrees."""
 
 
 class FisheyeLens(Model):

@@ -160,7 +160,7 @@ class ObjectSpec(Model):
     name: str = ""
     """Name for tables; the mesh file's name when absent."""
     mesh: Annotated[Path, MeshOrSequence()]
-    """OBJ, PLY, OFF, STL or glTF; with a run of # for a number, such as boat.####.ply, one a frame."""
+    """OBJ, PLY, OFF, STL, glTF, USD or Alembic; with # for a number, such as boat.####.ply, one a frame."""
     frames: FrameRange | None = None
     """Numbers of the files of a sequence, one a frame."""
     hold: Annotated[str, OneOf(("nearest", "last"))] | None = None

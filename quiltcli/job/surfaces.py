@@ -237,14 +237,16 @@ class NurbsSurface(SurfaceBase):
 
     kind: Literal["nurbs"]
     """Kind of surface."""
-    points: Annotated[tuple[Points, ...], Listed, Field(min_length=2)]
+    file: Annotated[Path, ExistingFile((".obj",), "a free-form surface")] | None = None
+    """OBJ with one free-form surface (cstype, deg, surf, parm), whose v runs up, instead of all below."""
+    points: Annotated[tuple[Points, ...], Listed, Field(min_length=2)] | None = None
     """Rows of control points, from left to right as seen from the front, numbers of `units` (metres)."""
     weights: Annotated[tuple[Annotated[tuple[Positive, ...], Listed], ...], Listed] | None = None
     """Rows of weights, as many as points; all 1 when absent."""
     degree: Annotated[
         tuple[Annotated[int, Field(ge=1, le=9)], Annotated[int, Field(ge=1, le=9)]], Items(2)
     ] = (3, 3)
-    """Degrees along the rows and from row to row."""
+    """Degrees along the rows and from row to row, 3 and 3 when absent."""
     knots_s: Numbers | None = None
     """Knots along the rows; evenly spaced and clamped when absent."""
     knots_t: Numbers | None = None
@@ -254,6 +256,9 @@ class NurbsSurface(SurfaceBase):
 
     def cross_checks(self) -> Iterator[Complaint]:
         """Rows of one length, and as many knots as points and degrees ask for."""
+        if self.points is None or self.file is not None:
+            yield from self._of_file()
+            return
         yield from same_lengths(self.points, "points")
         rows, columns = len(self.points), len(self.points[0])
         if self.weights is not None and [len(row) for row in self.weights] != [columns] * rows:
@@ -268,6 +273,15 @@ class NurbsSurface(SurfaceBase):
                 yield (name,), f"{words}, got {len(knots)}"
             elif knots is not None and (list(knots) != sorted(knots) or not knots[degree] < knots[count]):
                 yield (name,), "expected knots that never descend, and some range between them"
+
+    def _of_file(self) -> Iterator[Complaint]:
+        """Either a file, or control points."""
+        if self.file is None:
+            yield ("points",), "missing key (rows of control points, or file with a free-form surface)"
+            return
+        for key in ("points", "weights", "degree", "knots_s", "knots_t"):
+            if key in self.model_fields_set:
+                yield (key,), "the file has it (expected no such key beside file)"
 
 
 class HeightSurface(SurfaceBase):

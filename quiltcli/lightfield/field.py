@@ -27,6 +27,7 @@ class Field:
         pictures: those that were read.
         curve: (256,) linear light of the bytes of a picture.
         depths: depth maps that were read.
+        copied: whether pixels of the nearest view are copied, not blended with their neighbours.
     """
 
     file: LightfieldFile
@@ -35,6 +36,7 @@ class Field:
     pictures: Pictures
     curve: Float32Array
     depths: Pictures = field(repr=False)
+    copied: bool = False
 
     def picture(self, row: int, view: int, frame: int) -> Path:
         """File of the picture of a view; rows and views from 0."""

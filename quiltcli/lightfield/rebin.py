@@ -77,6 +77,9 @@ def _corners(
         for r in np.unique(row).tolist():
             there = row == r
             around[0, there], around[1, there], across[there] = field.cameras.rows[r].around(azimuth[there])
+        if field.copied:
+            yield row, np.where(across < 0.5, around[0], around[1]), vertical
+            continue
         yield row, around[0], vertical * (1 - across)
         yield row, around[1], vertical * across
 
@@ -90,7 +93,7 @@ def _rows(field: Field, rays: Rays, crossing: FloatArray) -> Iterator[tuple[IntA
         middle = _middle(rays)
         height = _crossing(np.broadcast_to(rays.served, middle.shape), middle, cameras.distance)[:, 1]
     low, high, share = cameras.levels(height)
-    if slices == "linear":
+    if slices == "linear" and not field.copied:
         yield low, 1 - share
         if len(cameras.rows) > 1:
             yield high, share
@@ -159,7 +162,8 @@ def _looked_up(
         camera = field.cameras.rows[r]
         x, y, ahead = _pixels(field.cameras.lens, camera.position[v], camera.rotation[v], places[chosen])
         values = field.pictures[field.picture(r, int(camera.view[v]), frame)]
-        colour[chosen], seen[chosen] = bilinear(values, x, y, field.curve)
+        look_up = nearest if field.copied else bilinear
+        colour[chosen], seen[chosen] = look_up(values, x, y, field.curve)
         seen[chosen] &= ahead
     return colour, seen
 
@@ -215,3 +219,18 @@ def bilinear(
             picked = pixels.take(row + place, axis=0)
             total += (near * beside)[:, None] * (curve.take(picked) if values.dtype == np.uint8 else picked)
     return total, inside
+
+
+def nearest(
+    values: NDArray[Any], x: FloatArray, y: FloatArray, curve: Float32Array
+) -> tuple[FloatArray, BoolArray]:
+    """As `bilinear`, of the pixel that places lie in."""
+    height, width = values.shape[:2]
+    inside = (x >= 0) & (y >= 0) & (x <= width) & (y <= height)
+    column, line = (
+        np.minimum(np.where(inside, place, 0).astype(np.int64), size - 1)
+        for place, size in ((x, width), (y, height))
+    )
+    picked = values[line, column]
+    found = curve.take(picked) if values.dtype == np.uint8 else picked
+    return np.broadcast_to(found, (len(x), 3)).astype(np.float64), inside

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,8 @@ class ChartView:
         turn: (3, 3) world from the viewer's own axes, for a projection; None where it is not turned.
         facet_from_quilt: (2, 3) page pixels to facet pixels.
         page: quilt address of its page's first pixel, and the page's width.
+        head: (3,) place of the head minus the eye, where each pixel's eye is somewhere beside it; else None.
+        half: half the distance between such eyes, metres; negative for left ones.
     """
 
     chart: Chart
@@ -34,6 +36,8 @@ class ChartView:
     turn: FloatArray | None
     facet_from_quilt: FloatArray
     page: tuple[int, int] = (0, 1)
+    head: FloatArray | None = None
+    half: float = 0.0
 
     def facet_pixels(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Facet pixels of page pixels that broadcast; what broadcasts stays small where it can."""
@@ -69,6 +73,15 @@ class ChartView:
         (a, b, _), (c, d, _) = self.facet_from_quilt
         return np.asarray(np.stack((d * across - b * down, a * down - c * across)) / (a * d - b * c))
 
+    def origins(self, x: FloatArray, y: FloatArray) -> FloatArray | None:
+        """Where rays of page pixels begin (3, ...), minus the eye; None where all begin there."""
+        if self.head is None or self.chart.omni is None:
+            return None
+        beside = self.chart.omni.beside(self.chart.points(*self.facet_pixels(x, y)))
+        if self.turn is not None:
+            beside = turned(self.turn, beside)
+        return self.head.reshape(3, *[1] * (beside.ndim - 1)) + self.half * beside
+
     def lit(self, x: FloatArray, y: FloatArray) -> BoolArray:
         """Which page pixels (...), given by their centres, show an image to the eye."""
         i, j = self.facet_pixels(x, y)
@@ -91,7 +104,11 @@ Charts = Sequence[Chart | None]
 
 
 def chart_views(
-    charts: Charts, layout: Layout, eye: FloatArray, camera_from_world: FloatArray
+    charts: Charts,
+    layout: Layout,
+    eye: FloatArray,
+    camera_from_world: FloatArray,
+    head: FloatArray | None = None,
 ) -> tuple[ChartView | None, ...]:
     """What an eye sees of every curved facet; None for flat ones.
 
@@ -100,7 +117,9 @@ def chart_views(
         layout: the facets' places, one row a facet.
         eye: (3,) world metres.
         camera_from_world: (3, 3) rows right, up, and back of whoever looks.
+        head: (3,) between their eyes, where they have two; world metres.
     """
+    beside = 0.0 if head is None else float((eye - head) @ camera_from_world[0])
     views: list[ChartView | None] = []
     for row, chart in enumerate(charts):
         if chart is None:
@@ -109,7 +128,10 @@ def chart_views(
         turn = camera_from_world.T if chart.follows == "view" else None
         page = max(int(layout.page[row]), 0)
         where = int(layout.page_offset[page]), int(layout.pages[page, 0])
-        views.append(ChartView(chart, eye, turn, inverse_affine(layout.quilt_from_facet[row]), where))
+        view = ChartView(chart, eye, turn, inverse_affine(layout.quilt_from_facet[row]), where)
+        if chart.omni is not None and head is not None:
+            view = replace(view, head=head - eye, half=beside)
+        views.append(view)
     return tuple(views)
 
 

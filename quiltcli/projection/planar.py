@@ -69,7 +69,9 @@ def quilt_rays(
 
 def viewer_rays(layout: Layout, facets: Facets, lit: BoolArray, viewer: Viewer) -> QuiltRays:
     """Rays of a viewer's eye through every facet's place in the quilt; curved facets have their charts'."""
-    views = chart_views(facets.charts, layout, viewer.eye, viewer.camera_from_world) if facets.charts else ()
+    if not facets.charts:
+        return quilt_rays(layout, lit, viewer.eye)
+    views = chart_views(facets.charts, layout, viewer.eye, viewer.camera_from_world, viewer.head)
     return quilt_rays(layout, lit, viewer.eye, views)
 
 

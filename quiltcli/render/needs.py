@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from quiltcli.channels import exr_channels
-from quiltcli.display import Facets
+from quiltcli.display import Facets, eyes_apart
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.capacity import bytes_text, free_disk, free_memory
 from quiltcli.job import JobFile
@@ -107,6 +107,8 @@ def method_problems(job: JobFile, facets: Facets) -> list[Problem]:
     if how.method not in ("homography", "raycast", "cubemap", "tessellate"):
         words = f"{how.method} projects onto flat facets, and the display has curved ones"
         return [source.problem("method", f"{words} (expected homography, raycast, cubemap or tessellate)")]
+    if eyes_apart(facets):
+        return _omnistereo_problems(job)
     if how.depth_bits is not None:
         words = "a depth buffer of so many bits belongs to flat facets, and the display has curved ones"
         return [source.problem("depth_bits", f"{words} (expected no such key)")]
@@ -114,3 +116,32 @@ def method_problems(job: JobFile, facets: Facets) -> list[Problem]:
         words = "tessellate does not tell motion (expected homography or raycast)"
         return [job.output.source.problem("channels", words)]
     return []
+
+
+def _omnistereo_problems(job: JobFile) -> list[Problem]:
+    """What a panorama with an eye for each column asks of a job: two eyes, and rays."""
+    how, found = job.render, []
+    if not job.is_stereo:
+        words = "the display's omnistereo gives each eye a picture, and the job has one eye (expected stereo)"
+        found += [spec.source.problem((), words) for spec in job.people.values()]
+    wanted = {
+        "method": (how.method, ("homography", "raycast")),
+        "samples": (how.samples, (1,)),
+        "shutter": (how.shutter, (0,)),
+        "depth_bits": (how.depth_bits, (None,)),
+        "backface_culling": (how.backface_culling, (False,)),
+        "double_sided": (how.double_sided, ("all",)),
+    }
+    for key, (value, allowed) in wanted.items():
+        if value not in allowed:
+            shown = str(value).lower() if isinstance(value, bool) else value
+            words = f"expected {_shown(allowed)} with omnistereo, which casts a ray a pixel, got {shown}"
+            found.append(how.source.problem(key, words))
+    if "motion" in job.output.channels:
+        found.append(job.output.source.problem("channels", "motion is not told with omnistereo"))
+    return found
+
+
+def _shown(allowed: tuple[object, ...]) -> str:
+    """Values that are allowed, in words."""
+    return " or ".join("no such key" if value is None else str(value).lower() for value in allowed)

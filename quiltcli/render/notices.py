@@ -12,6 +12,7 @@ from quiltcli.job import JobFile, PackSpec
 from quiltcli.job.frames import format_frames
 from quiltcli.layout import Layout
 from quiltcli.projection.camera import WIDEST, beyond_frustum
+from quiltcli.render.corrections import correction_notices
 from quiltcli.render.needs import disk_warnings, number_warnings, page_warnings
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import behind_words, their_lit_facets
@@ -61,6 +62,7 @@ def job_warnings(
         )
     if job.render.method == "twopass":
         yield from _narrow_pictures(facets, viewers_of(job, job.frames if frames is None else frames))
+    yield from correction_notices(job, facets, job.frames if frames is None else frames)
     yield from edge_on_notices(facets, viewers_of(job, job.frames if frames is None else frames))
     for spec in job.people.values():
         if spec.path.recorded is not None:

@@ -26,6 +26,7 @@ from quiltcli.images.window import cropped, frame_size, tight_window, whole_fram
 from quiltcli.job import PackSpec, dump_job
 from quiltcli.layout import Layout, write_layout
 from quiltcli.render.buffers import Buffers
+from quiltcli.render.corrections import corrects
 from quiltcli.render.report import Clock
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.view import EYES, View
@@ -55,7 +56,9 @@ def outputs(stage: Stage, folder: Path, job_sha: str, facet_ids: Iterable[int] |
     placed = stage.layout.page >= 0
     if facet_ids is not None:
         placed &= np.isin(stage.layout.facet, list(facet_ids))
-    return Outputs(folder, job_sha, np.flatnonzero(placed))
+    response = corrects(stage)
+    besides: Attributes = {} if response is None else {"quilt:corrections": response.record}
+    return Outputs(folder, job_sha, np.flatnonzero(placed), besides)
 
 
 def view_files(stage: Stage, out: Outputs, view: View) -> list[Path]:

@@ -58,6 +58,8 @@ class FrameRecord:
         eye: `left` or `right`, empty where there is one eye.
         binned: whether the method sorts triangles to the display's facets; otherwise the figures of that
             mean nothing.
+        corrections: what making up for the panels asked of them, `corrections.Headroom` as JSON; None
+            where nothing was corrected.
     """
 
     frame: int
@@ -74,6 +76,7 @@ class FrameRecord:
     warnings: tuple[str, ...] = ()
     eye: str = ""
     binned: bool = True
+    corrections: Mapping[str, Any] | None = None
 
     @property
     def settled_share(self) -> float:
@@ -112,6 +115,8 @@ class FrameRecord:
         times = {name: entry.pop(name) for name in ("wall_seconds", "seconds", "write_seconds")}
         eye = {"eye": eye} if (eye := entry.pop("eye")) else {}
         binned = {"binned": entry.pop("binned")}
+        corrections = entry.pop("corrections")
+        told = {} if corrections is None else {"corrections": corrections}
         shares = {"settled_share": self.settled_share, "replication": self.replication}
         return (
             {"frame": entry.pop("frame")}
@@ -120,6 +125,7 @@ class FrameRecord:
             | binned
             | shares
             | times
+            | told
             | {"warnings": list(warnings)}
         )
 

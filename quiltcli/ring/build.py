@@ -12,6 +12,7 @@ import numpy as np
 
 from quiltcli.display.clicks import calibrate
 from quiltcli.errors import JobError, Problem, ViewerError, raise_all
+from quiltcli.formats.bitplanes import STREAMS
 from quiltcli.formats.inputs import check_input
 from quiltcli.geometry import FloatArray
 from quiltcli.job import load_calibration_file
@@ -53,6 +54,7 @@ def rig_of(display: MirrorDisplayFile) -> Rig:
         step=turn * 2 * math.pi / display.rotation.positions,
         lobe=math.radians(display.diffuser.horizontal_deg),
         cone=display.diffuser.reflection == "cone",
+        streams=STREAMS if display.filters else ("",),
     )
 
 

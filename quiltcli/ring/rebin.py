@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray
+from quiltcli.halftone import halftone
+from quiltcli.halftone.light import expose, luminance
+from quiltcli.job.halftone import HalftoneSpec
 from quiltcli.lightfield import Field, Rays, rebin
+from quiltcli.lightfield.pictures import Pictures, read_picture
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.maps import backward
 from quiltcli.ring.rig import Pose
@@ -17,6 +24,29 @@ def rays_of(pose: Pose, curve: Curve, x: FloatArray, y: FloatArray) -> Rays:
     served = curve.points(np.array(pose.angle))
     viewer, mirror = (_in_world(pose, places) for places in (shown.viewer, shown.mirror))
     return Rays(viewer, mirror, served)
+
+
+def as_bits(field: Field, spec: HalftoneSpec, colours: bool) -> Field:
+    """The light field with photographs that are on or off, each halftoned by itself, whose pixels are copied.
+
+    As Jones et al. (2007), section 6, rearrange pictures that are dithered already.
+
+    Args:
+        field: the light field.
+        spec: how tones become bits, and their exposure.
+        colours: whether red, green and blue are bits of their own; else luminance is.
+    """
+
+    def read(path: Path) -> Float32Array:
+        values = read_picture(path)
+        light = field.curve.take(values) if values.dtype == np.uint8 else values
+        tones = np.moveaxis(light, -1, 0) if colours else luminance(light)[None]
+        inside = np.ones(tones.shape, dtype=np.bool_)
+        exposed = expose(np.ascontiguousarray(tones), inside, spec.exposure)
+        bits = np.stack([halftone(one[None], inside[:1], spec)[0] for one in exposed.tones], axis=-1)
+        return np.broadcast_to(bits, (*bits.shape[:2], 3)).astype(np.float32)
+
+    return replace(field, pictures=Pictures(field.cameras.lens.size, read), copied=True)
 
 
 def _in_world(pose: Pose, places: FloatArray) -> FloatArray:

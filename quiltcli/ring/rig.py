@@ -48,6 +48,7 @@ class Rig:
         step: from a picture to the next, radians, negative where the angle decreases.
         lobe: width of the diffuser's lobe, radians.
         cone: whether light leaves the mirror in cones about its lines, not in planes.
+        streams: colours of which each has pictures of one bit of its own; one without a name for all colours.
     """
 
     size: tuple[int, int]
@@ -60,6 +61,7 @@ class Rig:
     step: float
     lobe: float
     cone: bool = False
+    streams: tuple[str, ...] = ("",)
 
     @property
     def radius(self) -> float:

@@ -1,7 +1,7 @@
 """From the light of a mirror position to tones: how much of the time each pixel is on.
 
 A mirror chip's mean over time is linear, and so are tones. A single mirror shows luminance; the planes of a
-tent with filters of their own show the nearest mixture of these.
+tent with filters of their own show the nearest mixture of these; three chips show red, green and blue.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ class Tones:
     """What a position's picture of one bit is made of.
 
     Attributes:
-        values: (H, W) float16, 0 to 1, 0 where nothing is lit.
+        values: (C, H, W) float16, 0 to 1, 0 where nothing is lit; an image for each of the rig's streams.
         inside: (H, W) pixels that light the mirror.
-        clipped: share of these that were brighter than white.
+        clipped: share of these that were brighter than white, in the stream that has the most.
     """
 
     values: NDArray[np.float16]
@@ -47,11 +47,15 @@ def tones_of(rig: Rig, pictures: Sequence[Picture], spec: HalftoneSpec, shortest
     filters = np.array([side.filter for side in rig.sides])
     plain = bool((filters == filters[0]).all())
     shape = (rig.size[1], rig.size[0])
-    values, inside = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.bool_)
+    values, inside = np.zeros((len(rig.streams), *shape), dtype=np.float32), np.zeros(shape, dtype=np.bool_)
     for number, picture in enumerate(pictures):
         rgb = picture.rgb()[picture.lit]
-        tone = luminance(rgb) if plain else mixed(rgb, filters)[:, number] * np.float32(white_gain(filters))
-        values[picture.lit] = tone
+        if len(rig.streams) > 1:
+            values[:, picture.lit] = rgb.T
+        elif plain:
+            values[0, picture.lit] = luminance(rgb)
+        else:
+            values[0, picture.lit] = mixed(rgb, filters)[:, number] * np.float32(white_gain(filters))
         inside |= picture.lit
     time, exposure = None, spec.exposure
     if spec.compensate == "dwell":
@@ -60,8 +64,8 @@ def tones_of(rig: Rig, pictures: Sequence[Picture], spec: HalftoneSpec, shortest
             time[picture.lit] = dwell_times(picture.pose, picture.lit)
         # As the whole turn has it, so that a position does not depend on which others are drawn.
         exposure *= shortest / float(time[inside].min(initial=np.inf))
-    found = expose(values[None], inside, exposure, time)
-    return Tones(found.tones[0].astype(np.float16), inside, float(found.clipped[0]))
+    found = expose(values, inside, exposure, time)
+    return Tones(found.tones.astype(np.float16), inside, float(found.clipped.max()))
 
 
 def dwell_times(pose: Pose, lit: BoolArray) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 
 from quiltcli.errors import SceneError
 from quiltcli.geometry import Float32Array, FloatArray, cross, normalized
-from quiltcli.scene.environment.maps import Maps, maps_of
+from quiltcli.scene.environment.maps import Maps, maps_of, turned_maps
 from quiltcli.scene.environment.panorama import read_panorama
 
 if TYPE_CHECKING:
@@ -233,6 +233,31 @@ def area(
         rays,
         shadows=shadows,
     )
+
+
+def panel(
+    position: Sequence[float],
+    across: Sequence[float],
+    along: Sequence[float],
+    color: Sequence[float],
+    *,
+    shadows: bool = True,
+) -> Area:
+    """A rectangle by its middle and the ways to the middles of two sides, at right angles, metres."""
+    place, half_width, half_height = (np.array(v, dtype=np.float64) for v in (position, across, along))
+    return Area(_single(color), place, half_width, half_height, shadows=shadows)
+
+
+def environment(
+    panorama: str, axes: Sequence[float], color: Sequence[float], *, shadows: bool = False
+) -> Environment:
+    """An environment by the file of its panorama, and the world from its directions (9), row by row.
+
+    Raises:
+        SceneError: the panorama cannot be read.
+    """
+    turn = np.array(axes, dtype=np.float64).reshape(3, 3)
+    return Environment(_single(color), turned_maps(read_panorama(panorama), turn), shadows=shadows)
 
 
 def default_lights() -> tuple[Light, ...]:

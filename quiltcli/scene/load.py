@@ -14,8 +14,18 @@ from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import Float32Array
 from quiltcli.scene.bake import Baked, given_opacities, given_turns, given_uv
 from quiltcli.scene.importers.asset import Asset, read_asset
-from quiltcli.scene.importers.gltf import FileLight, GltfModel, Playing, contested_channels
-from quiltcli.scene.lights import Light, default_lights, directional, lights_of, point, spot
+from quiltcli.scene.importers.model import FileLight, Model, Playing
+from quiltcli.scene.lights import (
+    Light,
+    ambient,
+    default_lights,
+    directional,
+    environment,
+    lights_of,
+    panel,
+    point,
+    spot,
+)
 from quiltcli.scene.materials import Surface, material_table
 from quiltcli.scene.objects import Brought, ObjectError, SceneObject, bring, load_object
 from quiltcli.scene.scene import Scene
@@ -90,7 +100,7 @@ class _Gathered:
         for missing in asset.missing:
             self.notices.append(f"{name}: the material file {missing!r} is missing (default materials used)")
 
-    def animate(self, name: str, model: GltfModel | None, playing: Playing | None) -> None:
+    def animate(self, name: str, model: Model | None, playing: Playing | None) -> None:
         """Say what becomes of an object's animations."""
         if model is None or not model.clips:
             return
@@ -99,7 +109,7 @@ class _Gathered:
             words = f"{clips} of the file not played ('animation' of the object plays them)"
             self.notices.append(f"{name}: {words}")
             return
-        lost = contested_channels(model, playing)
+        lost = model.contested(playing)
         if lost:
             words = f"animated by two clips at once (the first counts): {counted(lost, 'channel')}"
             self.notices.append(f"{name}: {words}")
@@ -240,4 +250,10 @@ def _lamp(light: FileLight, scale: float, *, shadows: bool) -> Light:
         return directional(light.direction, color, shadows=shadows)
     if light.kind == "point":
         return point(light.position, color, light.reach, shadows=shadows)
+    if light.kind == "area":
+        return panel(light.position, light.across, light.along, color, shadows=shadows)
+    if light.kind == "ambient":
+        return ambient(color)
+    if light.kind == "environment":
+        return environment(light.panorama, light.axes, color, shadows=shadows)
     return spot(light.position, light.direction, color, light.cone, light.reach, shadows=shadows)

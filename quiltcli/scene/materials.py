@@ -32,6 +32,8 @@ class Texture:
         strength: scale of a normal map or a bump, strength of an occlusion map.
         gain: base and gain: values become base + gain · value.
         channel: r, g, b or a where the role takes one number; empty for the first.
+        raw: whether its numbers are light as they are, whatever the role.
+        opaque: whether its alpha is of no account.
         use: whose texture it is, for messages.
         nearest: whether texels that are seen enlarged are squares of one colour.
     """
@@ -44,6 +46,8 @@ class Texture:
     strength: float = 1.0
     gain: tuple[float, float] = (0.0, 1.0)
     channel: str = ""
+    raw: bool = False
+    opaque: bool = False
     use: str = field(default="", compare=False)
     nearest: bool = False
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.scene.bake import Baked, reposed
-from quiltcli.scene.importers.gltf import GltfModel, Playing, pose
+from quiltcli.scene.importers.model import Model, Playing
 from quiltcli.scene.importers.part import moved
 
 
@@ -23,14 +23,14 @@ class Mover:
         baked: the object as it was loaded, in any pose.
     """
 
-    model: GltfModel
+    model: Model
     playing: Playing
     matrix: FloatArray | None
     baked: Baked
 
     def at(self, seconds: float) -> tuple[FloatArray, Float32Array]:
         """World vertices (V, 3) and unit normals (V, 3) at a time, in the order of `baked`."""
-        vertices, normals = pose(self.model, seconds, self.playing)
+        vertices, normals = self.model.pose(seconds, self.playing)
         if self.matrix is not None:
             vertices, given = moved(self.matrix, vertices, normals)
             normals = np.zeros_like(vertices) if given is None else given

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +17,7 @@ from quiltcli.job.frames import format_frames
 from quiltcli.job.sequence import MeshSequence, numbered
 from quiltcli.scene.bake import Baked, bake
 from quiltcli.scene.importers.asset import Asset, read_asset
-from quiltcli.scene.importers.gltf import FileLight, Playing, gltf_lights, gltf_parts
+from quiltcli.scene.importers.model import FileLight, Playing
 from quiltcli.scene.importers.part import Part, moved, placed
 from quiltcli.scene.materials import Surface, textures_of
 from quiltcli.scene.movers import Mover
@@ -124,12 +124,12 @@ def bring(
         SceneError: nothing of it can be drawn.
     """
     override = {} if item.material is None else item.material.changes()
-    parts, lights = asset.parts, () if asset.model is None else gltf_lights(asset.model, time, playing)
+    parts, lights = asset.parts, () if asset.model is None else asset.model.lights(time, playing)
     if playing is not None and asset.model is not None:
-        parts = gltf_parts(asset.model, time, playing)
+        parts = asset.model.parts(time, playing)
     baked = bake(_parts(parts, matrix, override), item.normals)
-    if playing is not None and asset.model is not None and baked.empty and time is not None:
-        baked = _from_rest(item, asset, baked, Mover(asset.model, playing, matrix, baked), override, time)
+    if playing is not None and asset.model is not None and time is not None:
+        baked = _started(item, asset, baked, Mover(asset.model, playing, matrix, baked), override, time)
     if not len(baked.triangles):
         raise SceneError(Problem("every triangle is without area or not finite", str(item.mesh)))
     given = () if item.material is None else textures_of(item.material)
@@ -145,6 +145,18 @@ def _parts(parts: Sequence[Part], matrix: FloatArray | None, override: dict[str,
     if "color" in override:
         parts = tuple(replace(part, colors=None, opacities=None) for part in parts)
     return tuple(parts)
+
+
+def _started(
+    item: ObjectSpec, asset: Asset, baked: Baked, mover: Mover, override: dict[str, object], time: float
+) -> Baked:
+    """An object of an animation as it is at a time."""
+    if mover.model.hidden(time, mover.playing) and len(baked.triangles):
+        vertices, normals = mover.at(time)
+        return replace(baked, vertices=vertices, normals=normals)
+    if baked.empty and mover.model.form(time, mover.playing) == mover.model.form(None, mover.playing):
+        return _from_rest(item, asset, baked, mover, override, time)
+    return baked
 
 
 def _from_rest(
@@ -170,7 +182,7 @@ def _playing(item: ObjectSpec, asset: Asset) -> Playing | None:
         raise AnimationError(Problem("has no animation", str(item.mesh)))
     playing = Playing(item.animation.clip, item.animation.after)
     try:
-        asset.model.chosen(playing)
+        asset.model.check(playing)
     except MeshError as error:
         raise AnimationError(error.problems) from error
     return playing
@@ -207,6 +219,7 @@ class OneMesh:
     matrix: FloatArray | None
     start: Brought
     _last: list[_Pose] = field(default_factory=list)
+    _forms: list[tuple[Hashable, Brought]] = field(default_factory=list)
 
     @property
     def name(self) -> str:
@@ -237,10 +250,19 @@ class OneMesh:
         if time is None or model is None or self.playing is None:
             assert matrix is not None
             return self._carried(matrix)
-        vertices, normals = Mover(model, self.playing, matrix, self.start.baked).at(time)
-        lights = _placed_lights(gltf_lights(model, time, self.playing), matrix)
-        baked = replace(self.start.baked, vertices=vertices, normals=normals)
-        return replace(self.start, baked=baked, lights=lights)
+        form = model.form(time, self.playing)
+        if not self._forms:
+            self._forms.append((model.form(self.time, self.playing), self.start))
+        known = next((brought for one, brought in self._forms if one == form), None)
+        if known is None:
+            known = bring(self.item, self.start.asset, self.playing, time, matrix)
+            # The start is kept, and of the others the last.
+            self._forms[1:] = [(form, known)]
+            return known
+        vertices, normals = Mover(model, self.playing, matrix, known.baked).at(time)
+        lights = _placed_lights(model.lights(time, self.playing), matrix)
+        baked = replace(known.baked, vertices=vertices, normals=normals)
+        return replace(known, baked=baked, lights=lights)
 
     def _carried(self, matrix: FloatArray) -> Brought:
         """What it brings where a matrix (4, 4) has taken it."""
@@ -251,7 +273,7 @@ class OneMesh:
         vertices, _ = moved(matrix, self._local, np.empty((0, 3)))
         _, normals = moved(way, np.empty((0, 3)), baked.normals.astype(np.float64))
         assert normals is not None
-        lights = () if model is None else _placed_lights(gltf_lights(model), matrix)
+        lights = () if model is None else _placed_lights(model.lights(), matrix)
         new = replace(baked, vertices=vertices, normals=normalized(normals).astype(np.float32))
         return replace(self.start, baked=new, lights=lights)
 

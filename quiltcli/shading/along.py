@@ -47,18 +47,19 @@ def presence(
         return result
     matrix, ray = pixels.ray, pixels.rays(*offset)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        distance = plane_distance(target, triangle, ray)
+        distance = plane_distance(target, triangle, ray, pixels.origin)
     some = np.flatnonzero(scene.soft[triangle] & np.isfinite(distance) & (distance > 0))
     if not some.size:
         return result
-    triangle, matrix, ray = triangle[some], matrix[some], ray[some]
-    position = ray * distance[some, None]
+    triangle, matrix, ray, begin = triangle[some], matrix[some], ray[some], pixels.from_eye(some)
+    seen_from = ray * distance[some, None]
+    position = seen_from if begin is None else begin + seen_from
     weights = np.stack(barycentric(target, triangle, position))
-    slopes = weight_slopes(target, triangle, matrix, ray, position)
+    slopes = weight_slopes(target, triangle, matrix, ray, seen_from)
     number = triangle.astype(np.int32)
     seen = Points(
         triangle=number[:, None],
-        ray=PointVectors(position.T.astype(np.float32)[:, :, None]),
+        ray=PointVectors(seen_from.T.astype(np.float32)[:, :, None]),
         normal=None,
         weights=weights.astype(np.float32)[:, :, None],
         position=None,
@@ -91,19 +92,19 @@ def cast_on(
         (P,) triangles; MISS, or UNSURE where a surface lies on the near or far limit or may not be there.
     """
     directions = pixels.directions(*offset)
-    found = cast(target, directions, beyond)
+    found = cast(target, directions, beyond, pixels.origin)
     if scene.soft is None:
         return found
     start = np.zeros(found.size) if beyond is None else beyond.copy()
     live = np.flatnonzero(_passable(scene, found))
     while live.size:
         there = presence(scene, target, pixels.take(live), found[live], offset)
-        distance = plane_distance(target, found[live], directions[live])
+        distance = plane_distance(target, found[live], directions[live], pixels.from_eye(live))
         found[live[there == DOUBTFUL]] = UNSURE
         gone = there == ABSENT
         live, distance = live[gone], distance[gone]
         start[live] = np.maximum(distance, start[live]) * (1 + _PAST) + _PAST * 1e-3
-        found[live] = cast(target, directions[live], start[live])
+        found[live] = cast(target, directions[live], start[live], pixels.from_eye(live))
         live = live[_passable(scene, found[live])]
     return found
 

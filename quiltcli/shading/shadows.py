@@ -30,7 +30,7 @@ from quiltcli.scene.scene import Scene
 from quiltcli.shading.dimmed import let_through
 from quiltcli.shading.surface import Surface
 from quiltcli.visibility.rays.blockers import Blockers, blockers_of
-from quiltcli.visibility.resolve.vectors import sum_of_products, vector_values
+from quiltcli.visibility.resolve.vectors import PointVectors, sum_of_products, vector_values
 
 _SHORT_OF = 1 - 2.0**-12
 """Where a ray to a lamp ends, of the way to it: what touches the lamp hides nothing."""
@@ -94,7 +94,10 @@ class Shadows:
         triangle, position = points.triangle[rows, 0], points.position[:, rows]
         table = self.scene.corner_normals.take(triangle, axis=0)
         normal = table[:, 9:12].T[:, :, None]
-        side = -np.sign(sum_of_products(normal, position[:, :, :1]))
+        ray = self.surface.ray
+        # Where every point has an eye of its own, as on a spinning mirror, its ray says what side that is on.
+        seen = ray[rows].values if isinstance(ray, PointVectors) else position
+        side = -np.sign(sum_of_products(normal, seen[:, :, :1].astype(np.float64)))
         places = position + (self.surface.eye - blockers.middle)[:, None, None]
         places += normal * (side * blockers.above.take(triangle)[:, None])
         bent = np.flatnonzero(blockers.bent.take(triangle))

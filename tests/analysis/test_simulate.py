@@ -21,6 +21,7 @@ from quiltcli.projection.camera import camera_display
 from quiltcli.render.sequence import render
 from quiltcli.render.setup import set_stage
 from quiltcli.viewer.view import views_at
+from tests.helpers.even_light import COLOR, CYLINDER, WALLS, even_job
 from tests.helpers.flat_displays import PITCH, flat_display, moved, placed, rectangle
 
 MODELS = Path(__file__).parents[2] / "display_models"
@@ -290,3 +291,32 @@ def test_command_refuses(tmp_path, monkeypatch, arguments, message):
     assert result.exit_code == 2
     assert message in result.output
     assert not list(tmp_path.rglob("*.png"))
+
+
+@pytest.mark.parametrize("display", [WALLS, CYLINDER], ids=["flat", "curved"])
+@pytest.mark.parametrize("fall", ["exponent: 1.7", "table: [[0, 1], [30, 0.8, 0.9, 0.85], [85, 0.1]]"])
+def test_panels_that_darken_aslant_look_even_from_the_eye_once_corrected(tmp_path, display, fall):
+    text = f"{display}corrections:\n  brightness: {{{fall}, limit: 100}}\n  level: 0.02\n"
+    eye = (-1.2, 0.2, 1.6) if display == WALLS else (0.3, 0.1, 0.2)
+    job = even_job(tmp_path, text, eye=eye)
+    options = PictureOptions(size=(96, 72), threads=1)
+    seen = next(simulate(job, [1], options))
+    assert seen.comparison is not None
+    assert seen.comparison.share > 0.1
+    assert seen.comparison.maximum < 0.02 * 0.02 * min(COLOR)
+    # Without, they look as uneven as they are.
+    bare = next(simulate(job, [1], replace(options, corrected=False)))
+    assert bare.comparison is not None
+    assert bare.comparison.maximum > 0.3 * min(COLOR)
+
+
+def test_each_eye_has_images_of_its_own_angles(tmp_path):
+    stereo = "  stereo: {separation: 0.4}\n"
+    job = even_job(
+        tmp_path, f"{WALLS}corrections:\n  brightness: {{exponent: 2, limit: 100}}\n  level: 0.02\n", stereo
+    )
+    seen = list(simulate(job, [1], PictureOptions(size=(96, 72), threads=1)))
+    assert [one.eye for one in seen] == ["left", "right"]
+    for one in seen:
+        assert one.comparison is not None
+        assert one.comparison.maximum < 0.02 * 0.02 * min(COLOR)

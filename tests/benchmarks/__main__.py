@@ -15,11 +15,23 @@ from typing import Any
 
 import click
 
-from tests.benchmarks import curves, duels, meshes, opengl, page, rings, sequence, shadowed, tables, textured
+from tests.benchmarks import (
+    curves,
+    duels,
+    meshes,
+    opengl,
+    page,
+    rings,
+    sequence,
+    shadowed,
+    sorting,
+    tables,
+    textured,
+)
 from tests.benchmarks.race import canary, crowding
 
 ROOT = Path(__file__).parents[2]
-PARTS = ("duels", "textures", "shadows", "sequences", "facets", "pixels", "triangles", "rings")
+PARTS = ("duels", "textures", "shadows", "sequences", "facets", "sorting", "pixels", "triangles", "rings")
 
 
 @click.command(help=__doc__)
@@ -112,6 +124,10 @@ def _measure(
         if "facets" in parts:
             made["facets"] = list(curves.by_facets(rounds, curves.MODELS[:4:3] if quick else curves.MODELS))
             keep("facets")
+        if "sorting" in parts:
+            names_of = curves.MODELS[:4:3] if quick else curves.MODELS
+            results["sorting"] = list(sorting.measure(rounds, names_of))
+            keep("sorting")
         if "pixels" in parts and not quick:
             made["pixels"] = list(curves.by_pixels(rounds))
             keep("pixels")
@@ -137,6 +153,8 @@ def _tell(results: Mapping[str, Any], clock: str) -> None:
         click.echo("\n" + tables.curve_table(rows))
     if "facets" in made:
         click.echo("\n" + tables.stage_table(made["facets"]))
+    if "sorting" in results:
+        click.echo("\n" + sorting.sorting_table(results["sorting"]))
     click.echo("\n" + tables.target_table(results))
 
 

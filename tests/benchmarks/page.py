@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tests.benchmarks import tables
+from tests.benchmarks import sorting, tables
 from tests.benchmarks.pictures import bars_chart, lines_chart
 from tests.benchmarks.race import seconds
 
@@ -24,7 +24,10 @@ def write_docs(results: Mapping[str, Any]) -> list[Path]:
         text = put(text, name, content)
     page.write_text(text, encoding="utf-8")
     written = [page]
-    for name, picture in _pictures(curves).items():
+    pictures = _pictures(curves)
+    if "sorting" in results:
+        pictures["sorting"] = sorting.sorting_picture(results["sorting"])
+    for name, picture in pictures.items():
         path = DOCS / "pictures" / f"bench-{name}.svg"
         path.write_text(picture, encoding="utf-8")
         written.append(path)
@@ -51,6 +54,8 @@ def _tables(results: Mapping[str, Any], curves: Mapping[str, Rows]) -> dict[str,
         found["textures"] = tables.texture_table(results)
     if "shadows" in results:
         found["shadows"] = tables.shadow_table(results)
+    if "sorting" in results:
+        found["sorting"] = sorting.sorting_table(results["sorting"])
     if "sequences" in results:
         found["sequences"] = tables.sequence_table(results)
     found |= {name: tables.curve_table(rows) for name, rows in curves.items()}

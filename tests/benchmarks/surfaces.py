@@ -8,13 +8,14 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 from quiltcli.analysis.simulate import PictureOptions, simulate
+from quiltcli.display import lit_facets
 from quiltcli.images.preview import tone_map
 from quiltcli.job import load_job
 from quiltcli.render.buffers import Buffers, new_buffers
@@ -22,6 +23,7 @@ from quiltcli.render.crew import plan_of
 from quiltcli.render.methods import draw_frame
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.draw import Frame, batches, draw
 from quiltcli.visibility.rays.embree import aim
 from quiltcli.visibility.shares import bin_frame
 from tests.benchmarks.page import put
@@ -136,73 +138,108 @@ def facets_table() -> str:
     return text + f"| exact, in patches | {binned.facet_pairs / binned.reaching:.2f} |\n"
 
 
-def _prism(count: int) -> str:
-    """A prism of so many panels around (0, 1.7, 0)."""
+def _prism(count: int, rows: int = 1) -> str:
+    """A prism of so many panels around (0, 1.7, 0), each in so many rows."""
     turn = 2 * np.pi / count
     apothem = 1.0
     width = 2 * apothem * np.tan(turn / 2)
-    high = 1.5 * np.pi
+    high = 1.5 * np.pi / rows
+    pixels = [max(1600 // count, 1), 1200 // rows]
     lines = ["quilt_display: 1", "panels:"]
     for k in range(count):
         a = k * turn
-        at = [apothem * np.sin(a), 1.7, -apothem * np.cos(a)]
-        pixels = max(1600 // count, 1)
-        lines.append(
-            f"- {{pixels: [{pixels}, 1200], size: [{width:.9f}, {high:.9f}],"
-            f" at: [{at[0]:.9f}, {at[1]}, {at[2]:.9f}], yaw_deg: {-np.degrees(a):.9f}}}"
-        )
+        for row in range(rows):
+            at = [apothem * np.sin(a), 1.7 + (row - (rows - 1) / 2) * high, -apothem * np.cos(a)]
+            lines.append(
+                f"- {{pixels: {pixels}, size: [{width:.9f}, {high:.9f}],"
+                f" at: [{at[0]:.9f}, {at[1]}, {at[2]:.9f}], yaw_deg: {-np.degrees(a):.9f}}}"
+            )
     return "\n".join(lines) + "\n"
 
 
 def speed_table() -> str:
     """Drawing beside one Embree ray a pixel, in one run."""
+    dome = "{kind: sphere, radius: 2.5, zenith_deg: [0, 90], lit: inside, at: [0, 1, 0]"
+    ball = "{kind: sphere, radius: 1, at: [0, 1.5, 0]"
+    street = (0, 1.7, 0)
     cases = {
-        "dome 4096 × 1024 from inside, room": (
-            "surfaces:\n- {kind: sphere, radius: 2.5, zenith_deg: [0, 90], lit: inside, at: [0, 1, 0],"
-            " pixels: [4096, 1024]}",
-            "room",
-            (0.2, 1.3, 0.1),
-        ),
-        "cylinder panorama 1600 × 1200, city": (
-            "projection: {kind: cylinder, pixels: [1600, 1200]}",
-            "city",
-            (0, 1.7, 0),
-        ),
-        "equirectangular 2048 × 1024, city": (
-            "projection: {kind: equirect, pixels: [2048, 1024]}",
-            "city",
-            (0, 1.7, 0),
-        ),
-        "dome master 1536 × 1536, city": (
-            "projection: {kind: dome_master, pixels: [1536, 1536]}",
-            "city",
-            (0, 1.7, 0),
-        ),
-        "sphere 4096 × 2048 from outside, room": (
-            "surfaces:\n- {kind: sphere, radius: 1, at: [0, 1.5, 0], pixels: [4096, 2048]}",
-            "room",
-            (0.2, 1.7, 2.5),
-        ),
+        "dome 4096 × 1024 from inside, room": (_surface(dome, 4096, 1024), "room", (0.2, 1.3, 0.1)),
+        "cylinder panorama 1600 × 1200, city": (_projected("cylinder", 1600, 1200), "city", street),
+        "cylinder panorama 3200 × 2400, city": (_projected("cylinder", 3200, 2400), "city", street),
+        "equirectangular 2048 × 1024, city": (_projected("equirect", 2048, 1024), "city", street),
+        "equirectangular 4096 × 2048, city": (_projected("equirect", 4096, 2048), "city", street),
+        "dome master 1536 × 1536, city": (_projected("dome_master", 1536, 1536), "city", street),
+        "dome master 4096 × 4096, city": (_projected("dome_master", 4096, 4096), "city", street),
+        "sphere 4096 × 2048 from outside, room": (_surface(ball, 4096, 2048), "room", (0.2, 1.7, 2.5)),
     }
     rows = []
     for name, (display, scene, eye) in cases.items():
-        text = f"quilt_display: 1\n{display}\n"
-        stage, viewer = staged(text, scene, eye, (0, eye[1], -3), "output: {channels: [Z]}\n")
+        stage, viewer = staged(display, scene, eye, (0, eye[1], -3), "output: {channels: [Z]}\n")
         drawn(stage, viewer)
-        _, ours = drawn(stage, viewer)
-        count, theirs = _embree(stage, viewer)
-        rows.append(
-            (
-                name,
-                f"{count / 1e6:.2f}",
-                f"{1e9 * ours / count:.0f}",
-                f"{1e9 * theirs / count:.0f}",
-                f"{ours / theirs:.2f}",
-            )
-        )
-    head = "| display, scene | lit Mpx | quilt ns/px | Embree ns/px | ratio |\n"
-    head += "| --- | ---: | ---: | ---: | ---: |\n"
-    return head + "".join(f"| {' | '.join(row)} |\n" for row in rows)
+        count = 0
+        times: list[tuple[float, float, float]] = []
+        for _ in range(3):
+            count, theirs = _embree(stage, viewer)
+            times.append((_visibility(stage, viewer), drawn(stage, viewer)[1], theirs))
+        seen, frame, embree = np.median(times, axis=0).tolist()
+        each = (f"{1e9 * seconds / count:.0f}" for seconds in (seen, frame, embree))
+        rows.append((name, f"{count / 1e6:.2f}", *each, f"{seen / embree:.2f}", f"{frame / embree:.2f}"))
+    columns = "lit Mpx", "visibility", "with depth", "Embree", "visibility / Embree", "with depth / Embree"
+    return _table(("display, scene", *columns), rows)
+
+
+def ways_table() -> str:
+    """A curved display beside other ways to the same picture, in one run."""
+    eye, ahead, street = (0.2, 1.7, 2.5), (0, 1.7, -3), (0, 1.7, 0)
+    around, panorama = _projected("equirect", 2048, 1024), _projected("cylinder", 1600, 1200)
+    sheet = _surface("{kind: plane, width: 4, height: 2, at: [0, 1.5, -1]", 2048, 1024)
+    panel = "quilt_display: 1\npanels:\n- {size: [4, 2], at: [0, 1.5, -1], pixels: [2048, 1024]}\n"
+    depth, light = "output: {channels: [Z]}\n", "output: {channels: [rgba]}\n"
+    duels = {
+        "equirectangular 2048 × 1024, lit, by settled rays / exact": (
+            (around, "city", street, ahead, "render: {method: raycast}\n" + light),
+            (around, "city", street, ahead, light),
+        ),
+        "plane 2048 × 1024 in patches / as a flat facet, depth": (
+            (sheet, "room", eye, ahead, depth),
+            (panel, "room", eye, ahead, depth),
+        ),
+        "cylinder panorama 1600 × 1200 / a prism of 12,000 facets, depth": (
+            (panorama, "city", street, ahead, depth),
+            (_prism(160, 75), "city", street, ahead, depth),
+        ),
+    }
+    rows = []
+    for name, jobs in duels.items():
+        pairs = [staged(*job) for job in jobs]
+        times = [[drawn(stage, viewer)[1] for stage, viewer in pairs] for _ in range(4)]
+        first, second = np.median(times[1:], axis=0).tolist()
+        rows.append((name, f"{first:.2f}", f"{second:.2f}", f"{first / second:.2f}"))
+    return _table(("a frame / another", "s", "s", "ratio"), rows)
+
+
+def _projected(kind: str, width: int, height: int) -> str:
+    return f"quilt_display: 1\nprojection: {{kind: {kind}, pixels: [{width}, {height}]}}\n"
+
+
+def _surface(spec: str, width: int, height: int) -> str:
+    return f"quilt_display: 1\nsurfaces:\n- {spec}, pixels: [{width}, {height}]}}\n"
+
+
+def _table(columns: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    ruler = ("---", *["---:"] * (len(columns) - 1))
+    return "".join(f"| {' | '.join(row)} |\n" for row in (columns, ruler, *rows))
+
+
+def _visibility(stage: Stage, viewer: Viewer) -> float:
+    """Processor seconds until the depth keys of every pixel are known, with the rays and the sorting."""
+    begin = time.process_time()
+    rays = stage.rays(lit_facets(stage.facets, viewer.eye), viewer)
+    binned = bin_frame(plan_of(stage, viewer, rays))
+    frame = Frame(viewer, binned.sight, rays, stage.blocks, binned.pairs, patches=stage.patches)
+    for batch in batches(frame):
+        draw(frame, batch).done()
+    return time.process_time() - begin
 
 
 def _embree(stage: Stage, viewer: Viewer) -> tuple[int, float]:
@@ -283,6 +320,7 @@ TABLES = {
     "replication": facets_table,
     "cubemap": cubemap_table,
     "speed": speed_table,
+    "ways": ways_table,
 }
 
 

@@ -116,7 +116,7 @@ def test_schema_prints_the_schema_of_a_kind(kind: str, tmp_path: Path) -> None:
         (["export", "--format"], "mpcdi", ["mpcdi", "mpcdi1"]),
         (["import", "--format"], "o", ["obj"]),
         (["pattern", "--kind"], "a", ["all"]),
-        (["render", "--set"], "render.sam", ["render.samples="]),
+        (["render", "--set"], "render.sam", ["render.samples=", "render.sample_shading="]),
         ([], "ver", ["verify"]),
         (["schema"], "", ["job", "display", "layout", "scene", "lightfield", "calibration"]),
     ],

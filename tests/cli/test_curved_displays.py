@@ -1,4 +1,4 @@
-"""A curved display at the command line: what works, and what says that it is for flat ones."""
+"""A curved display at the command line: what works, and what says why it does not."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 from quiltcli.cli import main
 from quiltcli.formats.exr.image import read_header
@@ -50,24 +51,57 @@ def test_a_job_is_checked_packed_rendered_verified_and_cut_up(display: str, tmp_
     assert '"kind":"sphere"' in record or '"kind":"dome_master"' in record
 
 
+def test_the_page_compare_and_project_take_curved_displays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("quiltcli.analysis.methods.eyeviews.SIZE", (120, 90))
+    curved_job(tmp_path, PANORAMA, boxes(5, 0.5, 1.5), (0.5, 0.4, 3.0))
+    job, out = tmp_path / "job.yaml", tmp_path / "out"
+    assert quilt("render", job, "-j", "1")[0] == 0
+    picture = tmp_path / "around.png"
+    Image.fromarray(np.full((16, 32, 3), 128, np.uint8)).save(picture)
+    for arguments in (
+        ("view", out, "-o", tmp_path / "page.html", "--errors"),
+        ("compare", job, "--method", "cubemap", "-o", tmp_path / "compare"),
+        ("project", job, "--picture", picture, "--as", "equirect", "-o", tmp_path / "put", "--st-map"),
+    ):
+        code, said = quilt(*arguments)
+        assert code == 0, (arguments, said)
+
+
 @pytest.mark.parametrize(
-    ("word", "more"),
+    ("display", "arguments", "words"),
     [
-        ("view", ("out",)),
-        ("compare", ("job.yaml",)),
-        ("sweetspot", ("display.yaml", "--eye", "0,0,3", "--depth", "1")),
-        ("cameras", ("job.yaml", "-o", "cameras.json")),
+        (
+            SPHERE,
+            ("cameras", "job.yaml", "-o", "cameras.json"),
+            "no camera makes the image of a curved facet",
+        ),
+        (
+            PANORAMA,
+            ("sweetspot", "display.yaml", "--eye", "0,0,3"),
+            "this projection goes along with the eye",
+        ),
+        (
+            SPHERE,
+            ("compare", "job.yaml", "--method", "offaxis"),
+            "offaxis projects onto flat facets, and the display has curved ones",
+        ),
+        (
+            PANORAMA,
+            ("compare", "job.yaml", "--method", "tessellate"),
+            "tessellate is for displays of curved surfaces and nothing else",
+        ),
     ],
 )
-def test_commands_for_flat_facets_say_so(word: str, more: tuple[str, ...], tmp_path: Path) -> None:
-    curved_job(tmp_path, SPHERE, boxes(5, 0.5, 1.5), (0.5, 0.4, 3.0))
-    if word == "view":
-        assert quilt("render", tmp_path / "job.yaml", "-j", "1")[0] == 0
-        more = ("out", "-o", "page.html")
-    files = [tmp_path / part if ("." in part and "," not in part) or part == "out" else part for part in more]
-    code, said = quilt(word, *files)
+def test_what_curved_displays_do_not_have_is_said(
+    display: str, arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    curved_job(tmp_path, display, boxes(5, 0.5, 1.5), (0.5, 0.4, 3.0))
+    monkeypatch.chdir(tmp_path)
+    code, said = quilt(*arguments)
     assert code == 2, said
-    assert "is for flat facets, and this display has curved ones" in said
+    assert words in said
 
 
 @pytest.mark.parametrize(

@@ -71,9 +71,50 @@ def test_a_warp_mesh_of_a_projection_reads_back_as_the_same_directions(tmp_path:
     assert np.abs(ways[0] - ways[1])[:, known].max() < 2e-3
 
 
+@pytest.mark.parametrize(
+    "keys",
+    [
+        "kind: cylinder, hfov_deg: 120, heading_deg: 70, pixels: [256, 128]",
+        "kind: fisheye, fov_deg: 200, pixels: [128, 128]",
+    ],
+)
+def test_an_st_map_of_a_projection_reads_back_as_the_same_directions(keys: str, tmp_path: Path) -> None:
+    (tmp_path / "d.yaml").write_text(f"quilt_display: 1\nprojection: {{{keys}}}\n")
+    words = ["export", str(tmp_path / "d.yaml"), "-o", str(tmp_path / "st.exr"), "--format", "st"]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 0, result.output
+    first = load_display(load_display_file(tmp_path / "d.yaml")).charts[0]
+    assert first is not None
+    width, height = first.size
+    # Its angle and its aspect stand in the file.
+    heading = "heading_deg: 70, " if "heading" in keys else ""
+    text = f"{{kind: st, file: st.exr, {heading}pixels: [{width}, {height}]}}"
+    (tmp_path / "m.yaml").write_text(f"quilt_display: 1\nprojection: {text}\n")
+    second = load_display(load_display_file(tmp_path / "m.yaml")).charts[0]
+    assert second is not None
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    ways = [chart.points(x, y) for chart in (first, second)]
+    ways = [way / np.sqrt((way**2).sum(axis=0)) for way in ways]
+    known = np.ones(x.shape, dtype=bool) if second.mask is None else second.mask
+    across, up, back = np.einsum("ij,jhw->ihw", first.shape.linear.T, ways[0])
+    ahead = (back < 0) & (np.maximum(np.abs(across), np.abs(up)) <= -back * np.tan(np.radians(79)))
+    assert known[ahead].all()
+    assert known.mean() > 0.3
+    assert np.abs(ways[0] - ways[1])[:, known].max() < 1e-6
+
+
+def test_an_st_map_needs_something_ahead(tmp_path: Path) -> None:
+    keys = "kind: equirect, longitude_deg: [100, 170], pixels: [64, 32]"
+    (tmp_path / "d.yaml").write_text(f"quilt_display: 1\nprojection: {{{keys}}}\n")
+    words = ["export", str(tmp_path / "d.yaml"), "-o", str(tmp_path / "st.exr"), "--format", "st"]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 2
+    assert "facet 1 looks nowhere ahead" in result.output + result.stderr
+
+
 def test_a_display_has_no_other_forms(tmp_path: Path) -> None:
     (tmp_path / "d.yaml").write_text("quilt_display: 1\nprojection: {kind: equirect, pixels: [64, 32]}\n")
-    arguments = ["export", str(tmp_path / "d.yaml"), "-o", str(tmp_path / "m.exr"), "--format", "mpcdi"]
+    arguments = ["export", str(tmp_path / "d.yaml"), "-o", str(tmp_path / "m.exr"), "--format", "csv"]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 2
-    assert "a display has no form 'mpcdi'" in result.output
+    assert "a display has no form 'csv'" in result.output

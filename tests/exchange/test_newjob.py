@@ -11,9 +11,11 @@ import pytest
 from quiltcli.analysis.check import check_files
 from quiltcli.display import lit_facets, load_display, shared_edges
 from quiltcli.errors import JobError, LayoutError, OutputError, QuiltError
+from quiltcli.exchange.newjob.arenas import PRESETS
 from quiltcli.exchange.newjob.figures import length_text, read_grain, read_sides
-from quiltcli.exchange.newjob.kinds import KINDS, Wishes, missing
+from quiltcli.exchange.newjob.kinds import KINDS, missing
 from quiltcli.exchange.newjob.plan import draw_plan
+from quiltcli.exchange.newjob.wishes import Wishes
 from quiltcli.exchange.newjob.write import new_job, write_new_job
 from quiltcli.formats.drawing.shapes import Label
 from quiltcli.job import load_display_file
@@ -29,6 +31,7 @@ SMALL = {
     "cylinder": Wishes("cylinder", size="2x1m", columns=12, pitch="40mm"),
     "sphere": Wishes("sphere", size="1m", columns=10, rows=6, pitch="20mm"),
     "stairs": Wishes("stairs", size="2x0.2x0.3m", steps=3, pitch="50mm"),
+    "arena": Wishes("arena", columns=8, rows=2, installed=6, cabinet="40x40mm/16x16px"),
 }
 # Facets, edges that two of them share, and facets lit at the eye of frame 1 (None: at least one).
 EXPECTED = {
@@ -40,6 +43,7 @@ EXPECTED = {
     "cylinder": (12, 12, None),
     "sphere": (60, 110, None),
     "stairs": (6, 5, 6),
+    "arena": (12, 16, 12),
 }
 
 
@@ -216,3 +220,70 @@ def test_no_label_of_a_plan_lies_on_another(kind: str, figures: dict, tmp_path: 
         for u, v, across, down in boxes[:k]:
             beside = x + wide <= u or u + across <= x
             assert beside or abs(y - v) >= (high + down) / 2, (labels[k].text, u, v)
+
+
+# ---- arenas ----
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_an_arenas_panels_close_a_cylinder_that_faces_its_middle(name: str, tmp_path: Path) -> None:
+    arena = PRESETS[name]
+    job = new_job(Wishes("arena", preset=name), tmp_path)
+    facets = job.facets
+    side, pixels = float(arena.cabinet.split("x")[0]) / 1000, int(arena.cabinet.split("/")[1].split("x")[0])
+    assert facets.count == arena.rows * arena.installed
+    assert (facets.size == pixels).all()
+    middle = facets.origin + (facets.size[:, :1] * facets.du + facets.size[:, 1:] * facets.dv) / 2
+    eye = np.array(job.stand.eye)
+    assert eye.tolist() == pytest.approx([0, arena.rows * side / 2, 0], abs=1e-5)
+    # Corners lie on a circle around the eye, and the panels' middles half a side over tan(π/n) from it.
+    corners = facets.corners[:, [0, 2]]
+    np.testing.assert_allclose(
+        np.linalg.norm(corners, axis=1), side / 2 / np.sin(np.pi / arena.columns), rtol=1e-9
+    )
+    level = middle * (1, 0, 1)
+    reach = side / 2 / np.tan(np.pi / arena.columns)
+    np.testing.assert_allclose(facets.normal, -level / reach, atol=1e-9)
+    # The gap is behind, and as wide on both sides.
+    assert np.abs(level.sum(axis=0)[0]) < 1e-9
+    gap = arena.columns - arena.installed
+    shared = len(shared_edges(facets).facet_a)
+    assert shared == arena.rows * (arena.installed - (gap > 0)) + arena.installed * (arena.rows - 1)
+    if gap:
+        assert level[:, 2].max() < reach * np.cos(np.pi * gap / arena.columns) + 1e-9
+
+
+def test_an_arenas_canvas_is_its_picture_unrolled(tmp_path: Path) -> None:
+    """What is ahead lies in the middle; to the right on the canvas is to the right in the arena."""
+    job = new_job(Wishes("arena", preset="G6_2x8of10"), tmp_path)
+    layout = job.layout
+    assert layout.pages.tolist() == [[160, 40]]
+    place = layout.quilt_from_facet[:, :, 2]
+    middle = layout.origin + 10 * layout.du + 10 * layout.dv
+    azimuth = np.degrees(np.arctan2(middle[:, 0], -middle[:, 2]))
+    np.testing.assert_allclose(azimuth, (place[:, 0] + 10 - 80) / 20 * 36, atol=1e-6)
+    assert (place[middle[:, 1] > 0.0454, 1] == 0).all()
+    assert (place[middle[:, 1] < 0.0454, 1] == 20).all()
+
+
+@pytest.mark.parametrize(
+    ("wishes", "complaint"),
+    [
+        (Wishes("arena", preset="G6_2x9"), "--preset: expected G3_3x24, G3_4x12"),
+        (Wishes("arena", preset="g6_2x10"), "got 'g6_2x10' (did you mean G6_2x10?)"),
+        (Wishes("arena", preset="G6_2x10", rows=3), "--rows: the preset G6_2x10 says 2"),
+        (Wishes("arena", columns=12, rows=2, pitch="2mm"), "an arena is built of panels (expected --cabinet"),
+        (Wishes("arena", columns=12, rows=2, installed=13, cabinet="40x40mm/16x16px"),
+         "--installed: expected 1 to 12, got 13"),
+        (Wishes("wall", size="2x1m", pixels="64x32", preset="G6_2x10"), "--preset: means nothing to a wall"),
+    ],
+)  # fmt: skip
+def test_arenas_that_cannot_be_are_told(wishes: Wishes, complaint: str, tmp_path: Path) -> None:
+    with pytest.raises(JobError) as caught:
+        new_job(wishes, tmp_path)
+    assert complaint in str(caught.value)
+
+
+def test_a_preset_leaves_nothing_to_ask() -> None:
+    assert missing(Wishes("arena", preset="G4_4x12")) == {}
+    assert set(missing(Wishes("arena"))) == {"columns", "rows", "grain"}

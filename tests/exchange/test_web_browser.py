@@ -17,6 +17,7 @@ from quiltcli.projection.camera import frame_display
 from quiltcli.render.sequence import render
 from quiltcli.viewer.view import viewers_of
 from tests.helpers.chromium import chromium, look
+from tests.helpers.curved_jobs import boxes, curved_job
 
 ROOT = Path(__file__).parents[2]
 SIZE = (400, 300)
@@ -82,3 +83,25 @@ def test_from_aside_it_is_bent_as_the_simulation_says(job, tmp_path):
     # What the bound is worth: the frame for another eye, seen from here, is far beyond it.
     other = look(job.output.directory / "view.html", settings.replace("frame=2", "frame=1"), *SIZE, tmp_path)
     assert differences(other.pixels, seen.pixels)[0] > 5 * MEAN
+
+
+@pytest.mark.parametrize(
+    ("display", "eye", "at"),
+    [
+        ("surfaces:\n- {kind: sphere, radius: 1, pixels: [1024, 512]}", (0.6, 0.9, 2.6), (0, 0, 0)),
+        ("projection: {kind: equirect, pixels: [1024, 512], follows: view}", (0.3, 0.2, 0.1), (2, 0.5, -3)),
+    ],
+)
+def test_a_curved_display_is_the_picture_of_the_simulation(display, eye, at, tmp_path):
+    chromium()
+    curved = curved_job(tmp_path, display, boxes(60, 1.0, 4.0), eye, at)
+    render(curved)
+    view(curved.output.directory, options=ViewOptions(texture=8192, errors=False))
+    settings = "frame=1&ghost=0&path=0&edges=0"
+    seen = look(curved.output.directory / "view.html", settings, *SIZE, tmp_path)
+    assert seen.title == "ready 1"
+    assert seen.console == []
+    (result,) = simulate(curved, [1], PictureOptions(size=SIZE, compare=False))
+    mean, far_off = differences(seen.pixels, tone_map(result.picture))
+    assert mean < MEAN
+    assert far_off < 0.01

@@ -207,7 +207,7 @@ BAD = {
     "row.ply": (PLY_3.format("ascii").encode() + b"0 0\n", "{}:10: row 1 of vertex has 2 numbers (expected more)"),
     "text.ply": (PLY_3.format("ascii").encode() + b"0 0 z\n", "{}:10: row 1 of vertex is '0 0 z' (expected numbers)"),
     "mesh.fbx": (b"", "{}: is a .fbx file, which is not read (export as GLB)"),
-    "mesh.xyz": (b"", "{}: unknown mesh format '.xyz' (expected .obj, .off, .ply, .stl, .glb, .gltf)"),
+    "mesh.xyz": (b"", "{}: unknown mesh format '.xyz' (expected .obj, .off, .ply, .stl, .glb, .gltf, .usd, .usda, .usdc, .usdz)"),
 }  # fmt: skip
 
 

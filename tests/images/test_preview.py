@@ -182,3 +182,34 @@ def test_a_sequence_of_nothing_is_an_error(tmp_path):
 def test_a_name_and_a_format_that_disagree(tmp_path):
     with pytest.raises(OutputError, match="is a name for a png picture, not for tiff"):
         preview_paths([tmp_path / "a.exr"], tmp_path / "a.png", "tiff")
+
+
+def test_a_sequence_of_dome_masters_has_the_names_planetaria_take(tmp_path):
+    light = {c: np.full((8, 8), 0.5, np.float32) for c in "RGB"}
+    for frame in (7, 8):
+        write_exr(tmp_path / f"page_01.{frame:04d}.exr", light, {})
+    words = [str(tmp_path / "page_01.####.exr"), "-o", str(tmp_path / "dome"), "--domemaster", "Show"]
+    result = CliRunner().invoke(main, ["preview", *words])
+    assert result.exit_code == 0, result.output
+    names = sorted(path.name for path in (tmp_path / "dome").iterdir())
+    assert names == ["Show_000007.png", "Show_000008.png"]
+    assert np.asarray(Image.open(tmp_path / "dome" / "Show_000007.png")).shape == (8, 8, 3)
+    assert (tmp_path / "dome" / "Show_000007.png").read_bytes()[24] == 16  # bits a channel
+
+
+@pytest.mark.parametrize(
+    ("images", "output", "words"),
+    [
+        (["still.exr"], "dome", "has no frame number"),
+        (["a.0001.exr", "b.0001.exr"], "dome", "is a second image of frame 1"),
+        (["a.0001.exr"], "dome.png", "is a picture's name"),
+    ],
+)
+def test_what_is_no_sequence_of_dome_masters_is_said(tmp_path, images, output, words):
+    for name in images:
+        write_exr(tmp_path / name, {c: np.zeros((4, 4), np.float32) for c in "RGB"}, {})
+    paths = [str(tmp_path / name) for name in images]
+    more = ["-o", str(tmp_path / output), "--domemaster", "Show"]
+    result = CliRunner().invoke(main, ["preview", *paths, *more])
+    assert result.exit_code == 2
+    assert words in result.output + result.stderr

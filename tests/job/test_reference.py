@@ -24,6 +24,7 @@ BARE = {
     *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces", "threshold"),
     *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),
     *("uv_set", "offset", "strength", "quilt_camera", "distortion"),
+    *("exponent", "limit", "level", "peak", "gain", "gamma", "white", "signal_gamma"),
 }
 
 

@@ -453,8 +453,8 @@ def test_exact_depth_takes_the_fast_path(plates) -> None:
     [
         (
             "render.method=raycats",
-            "expected homography, offaxis, raskar, zscale, twopass, raycast, cubemap, tessellate, exact or"
-            " vertex, got the text 'raycats' (did you mean 'raycast'?)",
+            "expected homography, offaxis, raskar, zscale, twopass, raycast, cubemap, tessellate, octree,"
+            " independent, exact or vertex, got the text 'raycats' (did you mean 'raycast'?)",
         ),
         ("render.depth_bits=17", "expected 16, 24 or 32f, or no such key, got 17"),
         ("render.depth_bits=yes", "expected 16, 24 or 32f, or no such key, got the text 'yes'"),

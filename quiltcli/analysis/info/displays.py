@@ -39,7 +39,8 @@ def display_info(path: Path) -> Info:
     lines = [
         *_sources(spec),
         ("facets", _facets_text(data)),
-        ("lit side", lit[spec.viewing_side]),
+        ("lit side", "all sides" if spec.points is not None else lit[spec.viewing_side]),
+        *_corrections(spec),
         ("area", f"{number(data['area_m2'])} m²"),
         ("pixels", f"{data['pixels']:,}"),
         *([] if spec.projection else [("pitch", spread(low, high, "mm"))]),
@@ -67,11 +68,32 @@ def _sources(spec: DisplayFile) -> Iterator[tuple[str, str]]:
         yield "mesh", str(spec.mesh)
     if spec.panels is not None:
         yield "panels", f"{len(spec.panels):,}"
+    if spec.points is not None:
+        yield "points", str(spec.points.file)
     if spec.surfaces is not None:
         yield "surfaces", ", ".join(surface.kind for surface in spec.surfaces)
     if spec.projection is not None:
         projection = spec.projection
         yield "projection", f"{projection.kind}, which follows the {projection.follows}"
+
+
+def _corrections(spec: DisplayFile) -> Iterator[tuple[str, str]]:
+    """What images make up for, in words."""
+    given = spec.corrections
+    if given is None:
+        return
+    words = []
+    if given.brightness is not None:
+        table, limit = given.brightness.table, given.brightness.limit
+        fall = (
+            f"a table of {len(table)} rows" if table else f"cosine to the power {given.brightness.exponent:g}"
+        )
+        words.append(f"brightness by the angle ({fall}, up to {limit:g} times)")
+    if given.facets:
+        words.append(f"light of {counted(len(given.facets), 'facet')}")
+    if given.level != 1:
+        words.append(f"level {given.level:g}")
+    yield "corrections", ", ".join(words)
 
 
 def _display_data(spec: DisplayFile, facets: Facets) -> dict[str, Any]:
@@ -129,6 +151,7 @@ def _flat_data(spec: DisplayFile, facets: Facets) -> dict[str, Any]:
         "bounds": bounds(facets.corners),
         "shared_edges": len(shared_edges(facets).facet_a),
         "from_uv": spec.layout is not None,
+        **({"corrections": json.loads(facets.response.record)} if facets.response is not None else {}),
         "sha256": facets.sha256,
     }
 

@@ -102,7 +102,7 @@ def ring_job_info(path: Path, job: JobFile) -> Info:
         "job": values,
         "frame_count": turns,
         "positions": turns * rig.positions,
-        "packed": turns * -(-rig.positions // display.packing.images),
+        "packed": turns * -(-rig.positions // display.packing.images) * len(rig.streams),
         "sha256": job_sha256(job),
     }
     lines = [

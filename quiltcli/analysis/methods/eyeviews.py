@@ -8,14 +8,16 @@ import numpy as np
 
 from quiltcli.analysis.simulate.compare import Comparison, seam_pixels
 from quiltcli.analysis.simulate.compare import compare as compare_pictures
-from quiltcli.analysis.simulate.lookup import Shown, nearest_pixels, quilt_places
+from quiltcli.analysis.simulate.lookup import Shown, nearest_pixels
 from quiltcli.analysis.simulate.picture import (
     Camera,
     direct_light,
     displayed_light,
+    displayed_places,
     picture_rays,
-    visible_facets,
+    visible_triangles,
 )
+from quiltcli.analysis.simulate.skin import Skin, skin_of
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.images.preview import Bytes, block_means, tone_map
 from quiltcli.projection.camera import aimed, camera_display, frame_display
@@ -41,6 +43,8 @@ class EyeView:
         samples: see there.
         facet: (P,) facet that every ray meets, −1 for none.
         lit: (F,) facets that are drawn.
+        skin: the display as triangles.
+        triangle: (P,) which of those every ray meets, −1 for none.
     """
 
     camera: Viewer
@@ -49,10 +53,17 @@ class EyeView:
     samples: int
     facet: Int32Array
     lit: BoolArray
+    skin: Skin
+    triangle: Int32Array
 
     def shown(self, stage: Stage, buffers: Buffers) -> Shown:
         """The display with these images on."""
         return Shown(stage.facets, stage.layout, self.lit, buffers, stage.owners, self.camera.eye)
+
+    def light(self, stage: Stage, buffers: Buffers, how: str) -> tuple[Float32Array, BoolArray]:
+        """Light (3, P) of all rays, and which of them meet an image, by a filter of `lookup.FILTERS`."""
+        shown = self.shown(stage, buffers)
+        return displayed_light(shown, self.camera, self.through, self.facet, how, self.skin, self.triangle)
 
     def image(self, light: Float32Array) -> Float32Array:
         """Light (3, P) of all rays as a picture (H, W, 3)."""
@@ -61,18 +72,19 @@ class EyeView:
 
     def addresses(self, stage: Stage) -> IntArray:
         """Flat quilt address (P,) that each ray meets, −1 for none."""
-        met = np.flatnonzero((self.facet >= 0) & np.append(self.lit, False)[self.facet])
         shown = self.shown(stage, {})
-        rays = picture_rays(self.camera, self.through, met)
-        place = quilt_places(shown, self.facet[met], rays, self.camera.eye, self.lit)
+        met, bright, place = displayed_places(
+            shown, self.camera, self.through, self.facet, self.skin, self.triangle
+        )
         result = np.full(self.facet.size, -1)
-        result[met] = nearest_pixels(shown, self.facet[met], place)
+        result[met[bright]] = nearest_pixels(shown, self.facet[met[bright]], place)
         return result
 
 
 def whole_view(stage: Stage, viewer: Viewer, lit: BoolArray, threads: int) -> EyeView:
     """The view of the whole display."""
-    camera, fov = frame_display(viewer, stage.facets.corners, SIZE[0] / SIZE[1], turn=True)
+    corners = skin_of(stage.facets, viewer).vertices if stage.facets.charts else stage.facets.corners
+    camera, fov = frame_display(viewer, corners, SIZE[0] / SIZE[1], turn=True)
     return _view(stage, camera, fov, SIZE, _SAMPLES, lit, threads)
 
 
@@ -124,8 +136,9 @@ def _view(
     threads: int,
 ) -> EyeView:
     through = camera_display(camera, size[0] * samples, size[1] * samples, fov)
-    facet = visible_facets(stage, camera, through, threads)
-    return EyeView(camera, through, size, samples, facet, lit)
+    skin = skin_of(stage.facets, camera)
+    triangle = visible_triangles(stage, camera, through, threads, skin)
+    return EyeView(camera, through, size, samples, skin.facet_of(triangle), lit, skin, triangle)
 
 
 def direct_picture(stage: Stage, viewer: Viewer, view: EyeView, threads: int) -> Float32Array:
@@ -135,7 +148,7 @@ def direct_picture(stage: Stage, viewer: Viewer, view: EyeView, threads: int) ->
 
 def seen_against(stage: Stage, view: EyeView, buffers: Buffers, direct: Float32Array) -> Comparison:
     """What the viewer sees of images, against the direct picture."""
-    light, lit = displayed_light(view.shown(stage, buffers), view.camera, view.through, view.facet, "linear")
+    light, lit = view.light(stage, buffers, "linear")
     on_lit = np.where(lit, view.facet, -1).reshape(-1, view.size[0] * view.samples).astype(np.int32)
     covered = block_means((on_lit >= 0)[..., None], view.samples)[..., 0] == 1
     return compare_pictures(view.image(light), direct, covered, seam_pixels(on_lit, view.samples))
@@ -143,7 +156,7 @@ def seen_against(stage: Stage, view: EyeView, buffers: Buffers, direct: Float32A
 
 def crop(stage: Stage, view: EyeView, buffers: Buffers) -> Bytes:
     """What the viewer sees in a close view, at exact pixels: display values (H, W, 3)."""
-    light, _ = displayed_light(view.shown(stage, buffers), view.camera, view.through, view.facet, "nearest")
+    light, _ = view.light(stage, buffers, "nearest")
     return tone_map(view.image(light))
 
 

@@ -51,20 +51,22 @@ VARIANTS: tuple[Variant, ...] = (
     *(Variant(method, bits) for method in BUFFERED for bits in DEPTH_BITS),
     Variant("twopass"),
 )
-"""What is compared, the reference first."""
+"""What is compared on flat facets, the reference first."""
+IMAGED = (Variant("tessellate"), Variant("cubemap"))
+"""What is compared on curved facets beside the exact methods; on flat ones when it is asked for."""
 
 
 def variants_of(methods: Sequence[str]) -> tuple[Variant, ...]:
-    """The variants of some methods, of all where none is named.
+    """The variants of some methods, of all for flat facets where none is named.
 
     Raises:
         JobError: there is no such method.
     """
-    known = list(dict.fromkeys(variant.method for variant in VARIANTS))
+    known = list(dict.fromkeys(variant.method for variant in (*VARIANTS[:-1], *IMAGED, VARIANTS[-1])))
     for method in methods:
         if method not in known:
             raise JobError(f"--method: expected {either(known)}, got {method!r}")
-    return tuple(variant for variant in VARIANTS if not methods or variant.method in methods)
+    return tuple(v for v in (*VARIANTS, *IMAGED) if v.method in methods) if methods else VARIANTS
 
 
 @dataclass(frozen=True)
@@ -169,10 +171,12 @@ def _part(
     differ = np.flatnonzero((named != right) & (named >= 0))
     pixels = places(at[differ], stage.layout, stage.owners, rays)
     directions = pixels.directions()
-    far = plane_depth(target, named[differ], directions)
+    far = plane_depth(target, named[differ], directions, pixels.origin)
     nearest = np.full(differ.size, -np.inf)
     hit = right[differ] >= 0
-    nearest[hit] = plane_depth(target, right[differ][hit], directions[hit])
+    nearest[hit] = plane_depth(
+        target, right[differ][hit], directions[hit], pixels.from_eye(np.flatnonzero(hit))
+    )
     beyond = far > nearest + _SAME * np.abs(np.where(hit, nearest, 0.0))
     wrong = np.zeros(at.size, dtype=np.bool_)
     wrong[differ] = beyond

@@ -14,22 +14,10 @@ from quiltcli.analysis.methods.findings import REFERENCE
 from quiltcli.analysis.methods.study import Study
 from quiltcli.analysis.methods.table import COLUMNS, study_json, study_rows, study_words
 from quiltcli.formats.drawing.charts import Curve, bar_chart, line_chart
+from quiltcli.formats.drawing.pages import html_page, html_table
 from quiltcli.formats.png import png_bytes
 from quiltcli.formats.whole import make_folder, write_text
 from quiltcli.images.preview import Bytes
-
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em;
-       color: #222; background: #fff; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; }
-table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
-th, td { padding: .25em .6em; text-align: right; border-bottom: 1px solid #ddd; white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; }
-th { white-space: normal; vertical-align: bottom; }
-figure { margin: 0; font-size: 13px; } figure img { width: 100%; image-rendering: pixelated; display: block; }
-.wide, .scroll { overflow-x: auto; } svg { max-width: 100%; height: auto; }
-.grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(250px, 1fr)); gap: 14px; }
-"""
 
 _WORDS = {
     "figures": (
@@ -70,35 +58,22 @@ def write_comparison(study: Study, folder: Path) -> tuple[Path, Path]:
 def page_text(study: Study) -> str:
     """The page."""
     title = f"Render methods at frame {study.frame}"
-    lines = [
-        "<!doctype html>",
-        f'<html lang="en"><head><meta charset="utf-8"><title>{title}</title>',
-        f"<style>{_STYLE}</style></head><body>",
-        f"<h1>{title}</h1>",
+    parts = [
         f"<p>{study.pixels:,} pixels of {study.lit} lit facets;"
         f" near {study.near:g} m, far {study.far:g} m.</p>",
-        *_section("Figures", "figures", _table(study)),
+        *_section("Figures", "figures", html_table(COLUMNS, study_rows(study))),
         *(f"<p>{escape(words[0].upper() + words[1:])}.</p>" for words in study_words(study)),
         *_profile(study),
         *_section("Where depth goes wrong", "crops", _crops(study)),
         *_section("Time", "time", bar_chart(*_times(study))),
-        "</body></html>",
     ]
-    return "\n".join(lines) + "\n"
+    return html_page(title, parts)
 
 
 def _section(title: str, words: str, content: str, *names: object) -> Iterator[str]:
     yield f"<h2>{title}</h2>"
     yield f"<p>{_WORDS[words].format(*names)}</p>"
     yield f'<div class="scroll">{content}</div>'
-
-
-def _table(study: Study) -> str:
-    head = "".join(f"<th>{escape(name)}</th>" for name in COLUMNS)
-    rows = (
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in study_rows(study)
-    )
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
 
 def _profile(study: Study) -> Iterator[str]:

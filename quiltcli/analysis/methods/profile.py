@@ -40,8 +40,9 @@ class Profile:
 def best_profile(stage: Stage, rays: QuiltRays, truth: Buffers) -> Profile | None:
     """The line that stays longest on one object around its seam, None where no seam shows one."""
     edges = shared_edges(stage.facets)
+    flat = rays.lit & ~stage.facets.curved
     best: tuple[int, Profile | None] = (0, None)
-    for edge in np.flatnonzero(rays.lit[edges.facet_a] & rays.lit[edges.facet_b]).tolist():
+    for edge in np.flatnonzero(flat[edges.facet_a] & flat[edges.facet_b]).tolist():
         for place in _PLACES:
             line = _line(stage, rays, edges, edge, place)
             score = _run(stage, truth, line)

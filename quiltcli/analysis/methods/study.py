@@ -17,6 +17,7 @@ from quiltcli.analysis.methods.eyeviews import (
     whole_view,
 )
 from quiltcli.analysis.methods.findings import (
+    IMAGED,
     REFERENCE,
     VARIANTS,
     Difference,
@@ -31,14 +32,15 @@ from quiltcli.analysis.verify.frame import make_trial
 from quiltcli.analysis.verify.images import Images
 from quiltcli.analysis.verify.pixels import Trial
 from quiltcli.analysis.verify.seams import SeamPoints, check_seams, seam_points
-from quiltcli.display import demand_flat, shared_edges
-from quiltcli.errors import JobError
+from quiltcli.display import shared_edges
+from quiltcli.errors import JobError, raise_all
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
 from quiltcli.images.preview import Bytes
 from quiltcli.job import JobFile
 from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.methods import draw_frame
+from quiltcli.render.needs import method_problems
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.view import viewers_of
 from quiltcli.viewer.viewer import Viewer
@@ -55,13 +57,13 @@ class CompareOptions:
 
     Attributes:
         frame: the frame; the job's first when None.
-        variants: what to compare; the reference is always drawn.
+        variants: what to compare; None for all that suit the display. The reference is always drawn.
         threads: batches drawn at a time; 0 takes every core.
         begin: told of the name of each method before it is drawn.
     """
 
     frame: int | None = None
-    variants: Sequence[Variant] = VARIANTS
+    variants: Sequence[Variant] | None = None
     threads: int = 0
     begin: Callable[[str], None] = lambda name: None
 
@@ -122,9 +124,8 @@ def compare(job: JobFile, options: CompareOptions | None = None) -> Study:
     frame = job.frames[0] if options.frame is None else options.frame
     viewers_of(job, [frame])
     stage = set_stage(with_variant(job, REFERENCE)).at(frame)
-    demand_flat(stage.facets, "quilt compare")
     viewers = stage.views([frame])[0].viewers
-    variants = (REFERENCE, *(v for v in dict.fromkeys(options.variants) if v != REFERENCE))
+    variants = (REFERENCE, *(v for v in dict.fromkeys(_suiting(stage, options.variants)) if v != REFERENCE))
     threads = options.threads or default_threads()
     options.begin(REFERENCE.name)
     truth, seconds = _drawn(stage, viewers[0], REFERENCE, threads)
@@ -146,6 +147,24 @@ def compare(job: JobFile, options: CompareOptions | None = None) -> Study:
         crops=crops,
         marks=marks,
     )
+
+
+def _suiting(stage: Stage, asked: Sequence[Variant] | None) -> Sequence[Variant]:
+    """The variants that are asked for, or all that suit the display.
+
+    Raises:
+        JobError: one that is asked for does not.
+    """
+    if asked is None and not stage.facets.charts:
+        return VARIANTS
+    chosen = (*VARIANTS, *IMAGED) if asked is None else asked
+    problems = {
+        variant: method_problems(with_variant(stage.job, variant), stage.facets) for variant in chosen
+    }
+    if asked is not None:
+        raise_all(JobError, [problem for found in problems.values() for problem in found])
+    # With curved facets only what is exact, and what makes pictures of them.
+    return [variant for variant in chosen if not problems[variant]]
 
 
 def with_variant(job: JobFile, variant: Variant) -> JobFile:

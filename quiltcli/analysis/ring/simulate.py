@@ -215,8 +215,9 @@ def _image(
         rgb = np.zeros((lit.size, 3), dtype=np.float32)
         inside = np.flatnonzero(lit)
         rgb[inside] = light_along(show, target, Lines(lines.eye[inside], lines.along[inside]))
-        tone = luminance(rgb).reshape(lit.shape) * np.float32(stage.halftone.exposure)
-        return Image(np.clip(tone, 0, 1)[..., None] * tint, lit)
+        tone = rgb if len(rig.streams) > 1 else luminance(rgb)[:, None]
+        tone = tone.reshape(*lit.shape, -1) * np.float32(stage.halftone.exposure)
+        return Image(np.clip(tone, 0, 1) * tint, lit)
     bits = None if options.tones else bits_on_disk(stage, frame, position, options.folder)
     if bits is None:
         sides = range(len(rig.sides))
@@ -225,21 +226,24 @@ def _image(
         bits = tones.values.astype(np.float32)
         if not options.tones:
             sequel = Sequel([position], float(np.degrees(rig.step)))
-            bits = halftone(tones.values[None], tones.inside, stage.halftone, sequel)[0]
-    return Image(bits[..., None] * tint, lit)
+            bits = np.concatenate(
+                [halftone(one[None], tones.inside, stage.halftone, sequel) for one in tones.values]
+            )
+    return Image(np.moveaxis(bits, 0, -1) * tint, lit)
 
 
 def bits_on_disk(
     stage: RingStage, frame: int, position: int, folder: Path | None = None
 ) -> np.ndarray | None:
-    """The picture of one bit (H, W) that a render has left; None where there is none."""
+    """The pictures of one bit (C, H, W), by stream, that a render has left; None where one is missing."""
     number = number_of(stage, stage.job.frames.index(frame), position // PLANES)
-    path = (folder or stage.job.output.directory) / "packed" / packed_name(number)
-    if not path.is_file():
+    packed = (folder or stage.job.output.directory) / "packed"
+    paths = [packed / packed_name(number, stream) for stream in stage.rig.streams]
+    if not all(path.is_file() for path in paths):
         return None
     packing = stage.display.packing
-    planes = unpack(read_packed(path)[None], packing.order, packing.bits)
-    return np.asarray(planes[position % PLANES])
+    planes = (unpack(read_packed(path)[None], packing.order, packing.bits) for path in paths)
+    return np.stack([plane[position % PLANES] for plane in planes])
 
 
 def _direct(
@@ -251,7 +255,7 @@ def _direct(
     rgb = light_along(show, target, Lines(np.broadcast_to(camera.eye, along.shape), along))
     filters = np.array([side.filter for side in stage.rig.sides])
     exposure = np.float32(stage.halftone.exposure)
-    if (filters == filters[0]).all():
+    if (filters == filters[0]).all() and len(stage.rig.streams) == 1:
         grey = np.clip(luminance(rgb) * exposure, 0, 1)
         return np.asarray((grey[:, None] * filters[0]).reshape(*shape, 3), dtype=np.float32)
     return np.asarray(np.clip(rgb * exposure, 0, 1).reshape(*shape, 3), dtype=np.float32)

@@ -165,7 +165,7 @@ def _bits(
         return run
     sequel = Sequel(range(position - len(run) + 1, position + 1), float(np.degrees(stage.rig.step)))
     values, inside = (np.stack(part) for part in zip(*run, strict=True))
-    wanted = halftone(values, inside, stage.halftone, sequel)[-1]
+    wanted = [halftone(one, inside, stage.halftone, sequel)[-1] for one in values.swapaxes(0, 1)]
     verdict.bits += 1
     verdict.bits_wrong += int(np.count_nonzero(found != wanted))
     verdict.stray += int(np.count_nonzero(found & ~tones.inside))

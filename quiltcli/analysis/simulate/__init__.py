@@ -19,6 +19,7 @@ from quiltcli.analysis.simulate.picture import (
     direct_light,
     displayed_light,
     outlined,
+    seen_from,
     visible_triangles,
     with_channels,
 )
@@ -30,6 +31,7 @@ from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.images.preview import block_means
 from quiltcli.job import JobFile, job_sha256
 from quiltcli.projection.camera import aimed, camera_display, frame_display
+from quiltcli.render.corrections import corrects
 from quiltcli.render.crew import default_threads
 from quiltcli.render.notices import stage_warnings
 from quiltcli.render.setup import Stage, set_stage
@@ -67,6 +69,7 @@ class PictureOptions:
         edges: draw a line along the edges of the facets; what is compared is the picture without.
         threads: batches drawn at a time; 0 takes every core.
         eye: `left` or `right` of two eyes; empty for both.
+        corrected: whether images make up for the panels, as far as the job wants that.
     """
 
     size: tuple[int, int] = (1200, 900)
@@ -82,6 +85,7 @@ class PictureOptions:
     edges: bool = False
     threads: int = 0
     eye: str = ""
+    corrected: bool = True
 
 
 @dataclass(frozen=True)
@@ -120,6 +124,9 @@ def simulate(
         QuiltError: bad input, or images that cannot be read.
     """
     options = options or PictureOptions()
+    if not options.corrected:
+        update = {"render": job.render.model_copy(update={"corrections": False})}
+        job = job.model_copy(update=update)
     views_of(job, frames)  # what is wrong with the path is said before anything is loaded
     sha = job_sha256(job)
     stage = set_stage(with_channels(job, ("rgba",)))
@@ -153,19 +160,24 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     threads = options.threads or default_threads()
     triangle = visible_triangles(stage, camera, through, threads, skin)
     facet = skin.facet_of(triangle)
-    light, lit = displayed_light(shown, camera, through, facet, options.filter, skin, triangle)
+    seen = seen_from(stage, shown, camera.eye, threads)
+    light, lit = displayed_light(seen, camera, through, facet, options.filter, skin, triangle)
     picture = plain = block_means(_image(light, width), options.samples)
     if options.edges:
         picture = block_means(_image(outlined(light, facet, width), width), options.samples)
     if options.place is not None or not options.compare:
         return Simulation(viewer.frame, picture, None, None, "")
-    direct = block_means(_image(direct_light(stage, viewer, through, threads), width), options.samples)
+    # A display that is to show a share of its light is held against that share of the scene's.
+    response = corrects(stage)
+    level = np.float32(1.0 if response is None else response.level)
+    whole = direct_light(stage, viewer, through, threads)
+    direct = block_means(_image(level * whole, width), options.samples)
     on_lit = np.where(lit, facet, -1).reshape(height, width).astype(np.int32)
     covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
     coarse = None
     if options.resampled and not stage.facets.charts:
         coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads, options.filter)
-    once = None if coarse is None else block_means(_image(coarse, width), options.samples)
+    once = None if coarse is None else block_means(_image(level * coarse, width), options.samples)
     comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples), once)
     return Simulation(viewer.frame, picture, direct, comparison, "")
 
@@ -181,8 +193,9 @@ def _third_person(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOp
     width, height = (options.samples * side for side in options.size)
     through = camera_display(camera, width, height, options.fov or fov)
     threads = options.threads or default_threads()
+    seen = seen_from(stage, shown, camera.eye, threads)
     light, facet = third_person_light(
-        stage, viewer, shown, camera, through, options.filter, options.scene, threads
+        stage, viewer, seen, camera, through, options.filter, options.scene, threads
     )
     if options.edges:
         light = outlined(light, facet, width)

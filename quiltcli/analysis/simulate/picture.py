@@ -15,6 +15,7 @@ from quiltcli.job import JobFile
 from quiltcli.layout import Layout
 from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.buffers import new_buffers
+from quiltcli.render.corrections import on_panels
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene import Scene
@@ -93,11 +94,31 @@ def displayed_light(
         triangle: (P,) which of them each ray meets.
     """
     light = np.repeat(_SURROUND[:, None], facet.size, axis=1)
+    met, bright, place = displayed_places(shown, camera, through, facet, skin, triangle)
+    grey = np.abs(dot(shown.facets.normal[facet[met]], normalized(picture_rays(camera, through, met).T)))
+    light[:, met] = (_DARK * (0.25 + 0.75 * grey)).astype(np.float32)
+    light[:, met[bright]] = look_up(shown, facet[met[bright]], place, how)
+    lit = np.zeros(facet.size, dtype=np.bool_)
+    lit[met[bright]] = True
+    return light, lit
+
+
+def displayed_places(
+    shown: Shown,
+    camera: Viewer,
+    through: Camera,
+    facet: Int32Array,
+    skin: Skin | None = None,
+    triangle: Int32Array | None = None,
+) -> tuple[IntArray, BoolArray, FloatArray]:
+    """Where the camera's rays meet images; arguments as of `displayed_light`.
+
+    Returns:
+        (M,) rays that meet a facet; (M,) whether an image is there; (2, B) page pixels of those where one is.
+    """
     facing = lit_facets(shown.facets, camera.eye) & shown.lit
     met = np.flatnonzero(facet >= 0)
     rays = picture_rays(camera, through, met)
-    grey = np.abs(dot(shown.facets.normal[facet[met]], normalized(rays.T)))
-    light[:, met] = (_DARK * (0.25 + 0.75 * grey)).astype(np.float32)
     bright = facing[facet[met]]
     place = quilt_places(shown, facet[met[bright]], rays[:, bright], camera.eye, facing)
     if shown.facets.charts and skin is not None and triangle is not None:
@@ -108,10 +129,22 @@ def displayed_light(
         place[:, bent], shows = curved_pixels(shown, skin, facet[met[on[bent]]], found, camera)
         bright[on[bent[~shows]]] = False
         place = place[:, bright[on]]
-    light[:, met[bright]] = look_up(shown, facet[met[bright]], place, how)
-    lit = np.zeros(facet.size, dtype=np.bool_)
-    lit[met[bright]] = True
-    return light, lit
+    return met, bright, place
+
+
+def seen_from(stage: Stage, shown: Shown, eye: FloatArray, threads: int) -> Shown:
+    """The images as panels of a known response show them to an eye (3,); the same for perfect panels."""
+    response = shown.facets.response
+    if response is None:
+        return shown
+
+    def change(row: int, image: FloatArray, cosine: FloatArray) -> tuple[FloatArray, None]:
+        return response.shown(row, image, cosine), None
+
+    buffers = {name: shown.buffers[name].astype(np.float32) for name in "RGB"}
+    rows = np.flatnonzero(shown.lit).tolist()
+    on_panels(stage, shown.owners, rows, buffers, eye, change, threads)
+    return replace(shown, buffers=buffers)
 
 
 def curved_pixels(

@@ -94,8 +94,8 @@ def solid_angles(samples: Samples, places: FloatArray) -> FloatArray:
     x, y, z = (place[:, None] - point for place, point in zip(places.T, samples.point.T, strict=True))
     nx, ny, nz = samples.normal.T
     height = x * nx + y * ny + z * nz
-    if samples.both_sides:
-        height = np.abs(height)
+    if np.any(samples.both_sides):
+        height = np.where(samples.both_sides, np.abs(height), height)
     square = np.maximum(x * x + y * y + z * z, _EDGE_ON**2)
     result: FloatArray = np.where(height > _EDGE_ON, samples.area * height / (square * np.sqrt(square)), 0)
     return result

@@ -15,6 +15,8 @@ from quiltcli.analysis.sweetspot.distortion import MEASURES
 from quiltcli.analysis.sweetspot.floor import DIRECTIONS, contour, directions
 from quiltcli.analysis.sweetspot.scale import COLOURS, STEPS, UNSEEN, heat, ticks
 from quiltcli.analysis.sweetspot.study import SweetSpot
+from quiltcli.charts.lattice import chart_lines
+from quiltcli.display import Facets, display_points
 from quiltcli.geometry import FloatArray, dot, normalized
 from quiltcli.layout.picture.drawing import FAINT, INK, PAGE_EDGE, PAPER, Label, Shape
 
@@ -90,7 +92,11 @@ def draw_plan(spot: SweetSpot, measure: str = "p95") -> Plan:
 def _frame(spot: SweetSpot, content: list[FloatArray]) -> _Frame:
     """Room for the map, the display, the content, the eyes and the audience."""
     x0, z0, x1, z1 = spot.floor.area
-    spots = [np.array([[x0, z0], [x1, z1]]), spot.display.corners[:, [0, 2]], spot.shown.eye[None, [0, 2]]]
+    spots = [
+        np.array([[x0, z0], [x1, z1]]),
+        display_points(spot.display)[:, [0, 2]],
+        spot.shown.eye[None, [0, 2]],
+    ]
     spots += content
     if spot.audience is not None:
         spots.append(np.array(spot.audience).reshape(2, 2))
@@ -154,10 +160,23 @@ def _display(spot: SweetSpot, frame: _Frame) -> Iterator[Item]:
     thick = facets.count <= _FEW
     for lit in (False, True):
         mine = [facet for facet in range(facets.count) if (facet in shown) == lit]
-        paths = tuple(frame.at(_outline(facets.polygon(facet))) for facet in mine)
+        paths = tuple(frame.at(path) for facet in mine for path in _outlines(facets, facet))
         if thick:
             yield Lines(paths, PAPER, 7)
         yield Lines(paths, INK if lit else "#6b7483", 4 if thick else 1)
+
+
+def _outlines(facets: Facets, facet: int) -> list[FloatArray]:
+    """Lines in x and z: what is drawn of a facet; of a surface some rows and columns of its pixels."""
+    chart = facets.charts[facet] if facets.charts else None
+    if chart is None:
+        return [_outline(facets.polygon(facet))]
+    # From above an upright column is a point, and is left out.
+    return [
+        line[:, [0, 2]]
+        for line in chart_lines(chart)
+        if np.ptp(line[:, [0, 2]], axis=0).max() > 1e-6 * np.ptp(line, axis=0).max()
+    ]
 
 
 def _outline(polygon: FloatArray) -> FloatArray:
@@ -182,14 +201,17 @@ def _content(spot: SweetSpot) -> list[FloatArray]:
     """
     facets, eye, content = spot.display, spot.shown.eye, spot.content
     shown = np.unique(spot.shown.samples.facet[spot.shown.shown]).tolist()
-    size = float(np.ptp(facets.corners, axis=0).max())
+    low, high = (end(display_points(facets), axis=0) for end in (np.min, np.max))
+    size = float((high - low).max())
     if content.kind == "plane":
         point = np.array(content.point)
         ahead = normalized((point - eye) * (1, 0, 1))
-        near = np.linalg.norm(np.clip(point, facets.corners.min(axis=0), facets.corners.max(axis=0)) - point)
+        near = np.linalg.norm(np.clip(point, low, high) - point)
         ends = np.outer((-0.35 * size, 0.35 * size), (-ahead[2], ahead[0]))
         return [point[[0, 2]] + ends] if ahead.any() and near <= size else []
     if content.kind == "distance" or not 0 < abs(content.metres) <= size or len(shown) > _FEW:
+        return []
+    if facets.curved[shown].any():
         return []
     side = np.sign(dot(eye - facets.origin, facets.normal))
     behind = -content.metres * side[:, None] * facets.normal

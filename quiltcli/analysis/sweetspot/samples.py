@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from quiltcli.charts import Chart
+from quiltcli.charts.lattice import surface_lattice
+from quiltcli.charts.measure import measure
 from quiltcli.display import Facets, convex_parts
-from quiltcli.geometry import FloatArray, Int32Array, IntArray, cross, dot, next_in_row
+from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross, dot, next_in_row
 
 _ROOMY = 4  # times as many points as asked for are fine; then a part is one point
 
@@ -21,14 +24,14 @@ class Samples:
         point: (S, 3) world metres.
         normal: (S, 3) unit normal of the facet, out of its lit side.
         area: (S,) the area a point stands for, square metres.
-        both_sides: whether facets are lit on both sides.
+        both_sides: whether facets are lit on both sides, all or (S,) each; curved ones never are.
     """
 
     facet: Int32Array
     point: FloatArray
     normal: FloatArray
     area: FloatArray
-    both_sides: bool
+    both_sides: bool | BoolArray
 
 
 def sample_facets(facets: Facets, count: int) -> Samples:
@@ -36,10 +39,46 @@ def sample_facets(facets: Facets, count: int) -> Samples:
 
     A convex part is a fan of triangles about its middle, a triangle a lattice of points that holds its
     edges and corners: distortion is greatest there, and a display's symmetries are those of the points.
-    Displays of very many facets get the middle of each part alone.
+    Displays of very many facets get the middle of each part alone. Surfaces get lattices of rows and columns.
     """
+    if facets.charts:
+        return _with_curved(facets, count)
+    return _sample_flat(facets, count)
+
+
+def _with_curved(facets: Facets, count: int) -> Samples:
+    """Samples of a display with curved facets, which get as many of them as their area asks for."""
+    curved = np.flatnonzero(facets.curved & facets.enabled).tolist()
+    flat = replace(facets, enabled=facets.enabled & ~facets.curved, charts=())
+    areas = {row: measure(_chart(facets, row)).area for row in curved}
+    rest = float(_areas(_fans(flat)[0]).sum())
+    whole = rest + sum(areas.values())
+    found: list[Samples] = []
+    if flat.enabled.any():
+        found.append(_sample_flat(flat, max(1, round(count * rest / whole))))
+    for row, area in areas.items():
+        lattice = surface_lattice(_chart(facets, row), max(9, round(count * area / whole)))
+        owner = np.full(len(lattice.area), row, dtype=np.int32)
+        found.append(Samples(owner, lattice.point, lattice.normal, lattice.area, False))
+    return Samples(
+        facet=np.concatenate([one.facet for one in found]),
+        point=np.concatenate([one.point for one in found]),
+        normal=np.concatenate([one.normal for one in found]),
+        area=np.concatenate([one.area for one in found]),
+        both_sides=np.concatenate([np.full(len(one.facet), one.both_sides) for one in found]),
+    )
+
+
+def _chart(facets: Facets, row: int) -> Chart:
+    chart = facets.charts[row]
+    assert chart is not None
+    return chart
+
+
+def _sample_flat(facets: Facets, count: int) -> Samples:
+    """The same of a display of flat facets."""
     fans, part, part_facet = _fans(facets)
-    area = np.sqrt((cross(fans[:, 1] - fans[:, 0], fans[:, 2] - fans[:, 0]) ** 2).sum(axis=1)) / 2
+    area = _areas(fans)
     if len(fans) > _ROOMY * count:
         point, owner = fans[np.unique(part, return_index=True)[1], 0], part_facet
         weight = _sums(part, area)
@@ -62,6 +101,13 @@ def _fans(facets: Facets) -> tuple[FloatArray, IntArray, Int32Array]:
     number = np.cumsum(keep) - 1
     mine = keep[part]
     return fans[mine], number[part[mine]], part_facet[keep]
+
+
+def _areas(fans: FloatArray) -> FloatArray:
+    """Areas (T,) of triangles (T, 3, 3)."""
+    double = cross(fans[:, 1] - fans[:, 0], fans[:, 2] - fans[:, 0])
+    result: FloatArray = np.sqrt((double**2).sum(axis=1)) / 2
+    return result
 
 
 def _lattices(
@@ -114,4 +160,4 @@ def middle(samples: Samples) -> FloatArray:
 def heights(samples: Samples, place: FloatArray) -> FloatArray:
     """Distances (S,) of a place (3,) from the facets' planes, negative where it sees their dark side."""
     height = dot(place - samples.point, samples.normal)
-    return np.abs(height) if samples.both_sides else height
+    return np.where(samples.both_sides, np.abs(height), height)

@@ -23,7 +23,7 @@ from quiltcli.analysis.sweetspot.floor import (
     reaches,
 )
 from quiltcli.analysis.sweetspot.samples import sample_facets
-from quiltcli.display import Facets, demand_flat, load_display
+from quiltcli.display import Facets, demand_place, load_display
 from quiltcli.errors import JobError, Problem
 from quiltcli.geometry import FloatArray
 from quiltcli.job import load_display_file, load_job
@@ -132,7 +132,7 @@ def ask(
         spec = load_job(job)
         place = views_at(spec, spec.frames[0] if frame is None else frame)[0].viewer.eye
     facets = load_display(load_display_file(display))
-    demand_flat(facets, "quilt sweetspot")
+    demand_place(facets, "quilt sweetspot")
     return facets, Question(place, content, **how)
 
 

@@ -126,7 +126,7 @@ def sight(trial: Trial, address: IntArray) -> Sighting:
     plane = np.full(named.shape, np.inf)
     for k, row in enumerate(named):
         hit = np.flatnonzero(row >= 0)
-        plane[k, hit] = plane_depth(trial.target, row[hit], centre[hit])
+        plane[k, hit] = plane_depth(trial.target, row[hit], centre[hit], pixels.from_eye(hit))
     drawn = trial.images.triangle(address)
     z = trial.images.depth(address)
     unknown = np.full(address.size, -1)
@@ -187,7 +187,7 @@ def _faults(trial: Trial, seen: Sighting) -> tuple[Kinds, IntArray, IntArray]:
 
 def _distance(target: Target, some: Sighting, centre: FloatArray) -> FloatArray:
     """Distance (P,) along unit rays to the first hit's plane; 0 where that is nowhere."""
-    distance = plane_distance(target, np.maximum(some.named[0], 0), centre)
+    distance = plane_distance(target, np.maximum(some.named[0], 0), centre, some.pixels.origin)
     return np.where(np.isfinite(distance) & (distance > 0), distance, 0.0)
 
 

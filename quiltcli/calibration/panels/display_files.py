@@ -43,6 +43,8 @@ def moved_display(
         _panel(spec, facets, k, panel, middle[k], facing[k], up[k]) for k, panel in enumerate(spec.panels)
     ]
     data: dict[str, Any] = {"quilt_display": 1, "panels": panels, "viewing_side": spec.viewing_side}
+    if spec.corrections is not None:
+        data["corrections"] = plain(spec.corrections, str)
     return {"": _HEAD + dump_yaml(data)}
 
 
@@ -72,6 +74,8 @@ def mesh_display(
     if spec.resolution is not None:
         data["resolution"] = plain(spec.resolution, str)
     data["facets"] = each
+    if spec.corrections is not None:
+        data["corrections"] = plain(spec.corrections, str)
     if spec.layout is not None:
         data["layout"] = plain(spec.layout, str)
     return {"": _HEAD + dump_yaml(data), mesh: "\n".join(lines) + "\n"}

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from quiltcli.display import Facets, demand_flat
-from quiltcli.errors import OutputError, Problem
+from quiltcli.display import Facets
+from quiltcli.errors import DisplayError, OutputError, Problem
 from quiltcli.exchange.cameras import blender, ndisplay, screens, usd
 from quiltcli.exchange.cameras.cameras import Shot, shots
 from quiltcli.exchange.cameras.json import json_text
@@ -57,7 +57,10 @@ def write_cameras(stage: Stage, frames: Sequence[int], path: Path) -> int:
         raise OutputError(Problem(f"expected a name that ends in {', '.join(FORMS)}{why}", file=str(path)))
     if path.exists():
         raise OutputError(Problem("exists already (remove it, or choose another name)", file=str(path)))
-    demand_flat(stage.facets, "quilt cameras")
+    if stage.facets.curved.any():
+        words = "a camera's picture is flat, and no camera makes the image of a curved facet"
+        hint = "quilt facet cuts a surface into flat ones, quilt project takes a panorama made at the eye"
+        raise DisplayError(Problem(f"{words} ({hint})", stage.facets.path))
     found = shots(stage.facets, stage.views(frames))
     content = form(Shooting(stage.facets, stage.layout, found, stage.job.fps))
     write_whole(path, content.encode() if isinstance(content, str) else content)

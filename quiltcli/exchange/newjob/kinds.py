@@ -11,64 +11,18 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from quiltcli.errors import JobError
-from quiltcli.exchange.newjob.figures import Grain, Raster, Sided, read_grain, read_metres, read_sides
-
-Point = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """What was asked for, as it was typed; None where nothing was said."""
-
-    kind: str
-    size: str | None = None
-    left: str | None = None
-    right: str | None = None
-    angle: float | None = None
-    radius: str | None = None
-    columns: int | None = None
-    rows: int | None = None
-    steps: int | None = None
-    pitch: str | None = None
-    pixels: str | None = None
-    cabinet: str | None = None
-    base: str | None = None
-    inside: bool = False
-    ceiling: bool = False
-    treads: bool = True
-    eye: Point | None = None
-    canvas: tuple[int, int] | None = None
-    places: tuple[str, ...] = ()
-    padding: int = 0
-    scene: str | None = None
-    frames: str = "1-48"
-    fps: int = 24
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A panel of the new display: its middle in metres, turned by yaw, then by pitch."""
-
-    name: str
-    raster: Raster
-    at: Point
-    yaw_deg: float = 0.0
-    pitch_deg: float = 0.0
-
-
-@dataclass(frozen=True)
-class Ball:
-    """A sphere of flat pieces.
-
-    Attributes:
-        vertices: places, metres.
-        faces: vertex indices, 0-based, wound outwards.
-        pitch: metres from pixel to pixel.
-    """
-
-    vertices: tuple[Point, ...]
-    faces: tuple[tuple[int, ...], ...]
-    pitch: Fraction
+from quiltcli.exchange.newjob.arenas import arena_panels, arranged_arena, settled
+from quiltcli.exchange.newjob.figures import Sided, read_metres
+from quiltcli.exchange.newjob.wishes import (
+    Ball,
+    Panel,
+    Point,
+    Wishes,
+    base_of,
+    count_of,
+    grain_of,
+    sides_of,
+)
 
 
 @dataclass(frozen=True)
@@ -83,6 +37,7 @@ class Kind:
         around: whether one walks around it, rather than stands before or inside it.
         from_above: whether the viewer has to see its upper sides.
         encloses: whether it is around the viewer; `Wishes.inside` makes it so, too.
+        arrange: adds to wishes where the eye and the panels on the canvas are; None for nothing.
     """
 
     about: str
@@ -92,32 +47,13 @@ class Kind:
     around: bool = False
     from_above: bool = False
     encloses: bool = False
-
-
-def _grain(wishes: Wishes) -> Grain:
-    return read_grain(wishes.pitch, wishes.pixels, wishes.cabinet)
-
-
-def _base(wishes: Wishes, default: float = 0.0) -> float:
-    if wishes.base is None:
-        return default
-    return float(read_metres(wishes.base, "--base", negative=True))
-
-
-def _sides(text: str | None, count: int, option: str) -> tuple[Sided, ...]:
-    return read_sides(text or "", count, option)
-
-
-def _count(value: int | None, least: int, most: int, option: str) -> int:
-    if value is None or not least <= value <= most:
-        raise JobError(f"{option}: expected {least} to {most}, got {value}")
-    return value
+    arrange: Callable[[Wishes], Wishes] | None = None
 
 
 def _wall(wishes: Wishes) -> tuple[Panel, ...]:
-    wide, high = _sides(wishes.size, 2, "--size")
-    raster = _grain(wishes).raster("wall", (wide, high))
-    return (Panel("wall", raster, (0.0, _base(wishes) + float(raster.size[1]) / 2, 0.0)),)
+    wide, high = sides_of(wishes.size, 2, "--size")
+    raster = grain_of(wishes).raster("wall", (wide, high))
+    return (Panel("wall", raster, (0.0, base_of(wishes) + float(raster.size[1]) / 2, 0.0)),)
 
 
 def _corner(wishes: Wishes) -> tuple[Panel, ...]:
@@ -125,13 +61,13 @@ def _corner(wishes: Wishes) -> tuple[Panel, ...]:
     angle = 90.0 if wishes.angle is None else wishes.angle
     if not 10 <= angle <= 350:
         raise JobError(f"--angle: expected 10 to 350 degrees between the lit sides, got {angle:g}")
-    grain, half = _grain(wishes), math.radians(angle / 2)
+    grain, half = grain_of(wishes), math.radians(angle / 2)
     panels = []
     for name, text, side in (("left", wishes.left, -1), ("right", wishes.right, 1)):
-        wide, high = _sides(text, 2, f"--{name}")
+        wide, high = sides_of(text, 2, f"--{name}")
         raster = grain.raster(name, (wide, high))
         away = float(raster.size[0]) / 2
-        middle = (side * away * math.sin(half), _base(wishes) + float(raster.size[1]) / 2)
+        middle = (side * away * math.sin(half), base_of(wishes) + float(raster.size[1]) / 2)
         at = (*middle, away * math.cos(half))
         panels.append(Panel(name, raster, at, yaw_deg=-side * (90 - angle / 2)))
     return tuple(panels)
@@ -139,9 +75,9 @@ def _corner(wishes: Wishes) -> tuple[Panel, ...]:
 
 def _curve(wishes: Wishes) -> tuple[Panel, ...]:
     """Flat columns along an arc; the middle of the arc lies over the origin."""
-    count = _count(wishes.columns, 1, 1000, "--columns")
-    wide, high = _sides(wishes.size, 2, "--size")
-    raster = _grain(wishes).raster("column", (Sided(wide.amount / count, wide.in_pixels), high))
+    count = count_of(wishes.columns, 1, 1000, "--columns")
+    wide, high = sides_of(wishes.size, 2, "--size")
+    raster = grain_of(wishes).raster("column", (Sided(wide.amount / count, wide.in_pixels), high))
     bend = read_metres(wishes.radius or "", "--radius", negative=True)
     width, radius = float(raster.size[0]), abs(float(bend))
     if radius == 0 or math.asin(min(1.0, width / 2 / radius)) * 2 * count > 2 * math.pi * (1 + 1e-9):
@@ -149,7 +85,7 @@ def _curve(wishes: Wishes) -> tuple[Panel, ...]:
             f"--radius: {count} columns of {width:g} m go more than around a circle of {radius:g} m"
         )
     step = 2 * math.asin(width / 2 / radius)
-    reach, y = radius * math.cos(step / 2), _base(wishes) + float(raster.size[1]) / 2
+    reach, y = radius * math.cos(step / 2), base_of(wishes) + float(raster.size[1]) / 2
     panels = []
     for k in range(count):
         turn, sense = (k - (count - 1) / 2) * step, -1 if bend > 0 else 1
@@ -161,8 +97,8 @@ def _curve(wishes: Wishes) -> tuple[Panel, ...]:
 
 def _cave(wishes: Wishes) -> tuple[Panel, ...]:
     """Three walls and a floor around the origin, open behind the viewer; a ceiling where it is asked for."""
-    grain, base = _grain(wishes), _base(wishes)
-    wide, high, deep = _sides(wishes.size, 3, "--size")
+    grain, base = grain_of(wishes), base_of(wishes)
+    wide, high, deep = sides_of(wishes.size, 3, "--size")
     front = grain.raster("front", (wide, high))
     side, ground = grain.raster("left", (deep, high)), grain.raster("floor", (wide, deep))
     w, h = map(float, front.size)
@@ -181,8 +117,8 @@ def _cave(wishes: Wishes) -> tuple[Panel, ...]:
 
 def _cube(wishes: Wishes) -> tuple[Panel, ...]:
     """Four sides and a top, to walk around."""
-    grain, base = _grain(wishes), _base(wishes)
-    wide, high, deep = _sides(wishes.size, 3, "--size")
+    grain, base = grain_of(wishes), base_of(wishes)
+    wide, high, deep = sides_of(wishes.size, 3, "--size")
     front, side = grain.raster("front", (wide, high)), grain.raster("right", (deep, high))
     top = grain.raster("top", (wide, deep))
     w, h, d = float(front.size[0]), float(front.size[1]), float(side.size[0])
@@ -198,14 +134,14 @@ def _cube(wishes: Wishes) -> tuple[Panel, ...]:
 
 def _cylinder(wishes: Wishes) -> tuple[Panel, ...]:
     """Flat columns all around the vertical, whose edges lie on a circle."""
-    count = _count(wishes.columns, 3, 1000, "--columns")
-    across, high = _sides(wishes.size, 2, "--size")
+    count = count_of(wishes.columns, 3, 1000, "--columns")
+    across, high = sides_of(wishes.size, 2, "--size")
     if across.in_pixels:
         raise JobError(f"--size: the diameter is a length (expected such as 2x1.5m), got {wishes.size!r}")
     chord = Fraction(float(across.amount) * math.sin(math.pi / count)).limit_denominator(10**9)
-    raster = _grain(wishes).raster("column", (Sided(chord), high))
+    raster = grain_of(wishes).raster("column", (Sided(chord), high))
     reach = float(raster.size[0]) / 2 / math.tan(math.pi / count)
-    y = _base(wishes) + float(raster.size[1]) / 2
+    y = base_of(wishes) + float(raster.size[1]) / 2
     panels = []
     for k in range(count):
         turn = 360.0 * k / count
@@ -216,12 +152,12 @@ def _cylinder(wishes: Wishes) -> tuple[Panel, ...]:
 
 def _sphere(wishes: Wishes) -> Ball:
     """A ball of trapezoids between circles of latitude, with triangles at the poles."""
-    columns, rows = _count(wishes.columns, 3, 500, "--columns"), _count(wishes.rows, 2, 500, "--rows")
-    (across,) = _sides(wishes.size, 1, "--size")
+    columns, rows = count_of(wishes.columns, 3, 500, "--columns"), count_of(wishes.rows, 2, 500, "--rows")
+    (across,) = sides_of(wishes.size, 1, "--size")
     if across.in_pixels or wishes.pitch is None or wishes.pixels or wishes.cabinet:
         raise JobError("a sphere needs a diameter and a pitch (expected such as --size 2m --pitch 3mm)")
     radius = float(across.amount) / 2
-    middle = _base(wishes) + radius
+    middle = base_of(wishes) + radius
     vertices: list[Point] = [(0.0, middle - radius, 0.0)]
     for i in range(1, rows):
         low = math.pi * i / rows
@@ -253,9 +189,9 @@ def _stairs(wishes: Wishes) -> tuple[Panel, ...]:
     """Risers and treads that climb away from the viewer; the first riser stands over the origin."""
     if wishes.pixels:
         raise JobError("stairs have panels of two sizes (expected --pitch or --cabinet, not --pixels)")
-    grain, base = _grain(wishes), _base(wishes)
-    count = _count(wishes.steps, 1, 500, "--steps")
-    wide, high, deep = _sides(wishes.size, 3, "--size")
+    grain, base = grain_of(wishes), base_of(wishes)
+    count = count_of(wishes.steps, 1, 500, "--steps")
+    wide, high, deep = sides_of(wishes.size, 3, "--size")
     riser, tread = grain.raster("riser", (wide, high)), grain.raster("tread", (wide, deep))
     rise, run = float(riser.size[1]), float(tread.size[1])
     panels = []
@@ -322,6 +258,14 @@ KINDS: dict[str, Kind] = {
         takes=("base", "treads"),
         from_above=True,
     ),
+    "arena": Kind(
+        "a cylinder of LED panels around an animal; --preset has those of the Reiser lab, such as G6_2x10",
+        {"columns": "places for columns all around, such as 12", "rows": "rows of panels, such as 4"},
+        arena_panels,
+        takes=("base", "installed", "preset"),
+        encloses=True,
+        arrange=arranged_arena,
+    ),
 }
 GRAIN = "pitch such as 6mm, pixels of a panel such as 1920x1080px, or cabinet such as 500x500mm/128x128px"
 
@@ -334,6 +278,8 @@ def missing(wishes: Wishes) -> dict[str, str]:
     Raises:
         JobError: there is no such kind.
     """
+    kind_of(wishes)
+    wishes = settled(wishes)
     asked = {name: text for name, text in kind_of(wishes).needs.items() if getattr(wishes, name) is None}
     if wishes.pitch is None and wishes.pixels is None and wishes.cabinet is None:
         asked["grain"] = "pixel pitch, such as 3mm" if wishes.kind == "sphere" else GRAIN
@@ -342,7 +288,7 @@ def missing(wishes: Wishes) -> dict[str, str]:
 
 _FIGURES = (
     *("size", "left", "right", "angle", "radius", "columns", "rows", "steps"),
-    *("base", "inside", "ceiling", "treads"),
+    *("base", "inside", "ceiling", "treads", "preset", "installed"),
 )
 
 

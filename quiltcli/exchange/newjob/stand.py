@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.display import Facets
-from quiltcli.exchange.newjob.kinds import Wishes, kind_of
+from quiltcli.exchange.newjob.kinds import kind_of
+from quiltcli.exchange.newjob.wishes import Wishes
 
 _TALL = 1.6  # height of the eyes of somebody who stands, metres
 
@@ -60,7 +61,9 @@ def stand_for(wishes: Wishes, facets: Facets) -> Stand:
             look = eye - (0, 0, reach)
     sides = box[box > 1e-9 * reach]
     content = 0.3 * float(sides.min())
-    return Stand(_rounded(eye), _rounded(look), _round(orbit), reach, _round(content))
+    # In something around the viewer that is smaller than they are, millimetres are degrees.
+    digits = 5 if kind.encloses and reach < 0.5 else 3
+    return Stand(_rounded(eye, digits), _rounded(look, digits), _round(orbit), reach, _round(content))
 
 
 def _round(value: float) -> float:
@@ -68,7 +71,7 @@ def _round(value: float) -> float:
     return float(f"{value:.4g}") + 0.0
 
 
-def _rounded(point: np.ndarray) -> tuple[float, float, float]:
-    """A point to a millimetre."""
-    x, y, z = (round(float(c), 3) + 0.0 for c in point)
+def _rounded(point: np.ndarray, digits: int) -> tuple[float, float, float]:
+    """A point to so many digits of a metre."""
+    x, y, z = (round(float(c), digits) + 0.0 for c in point)
     return x, y, z

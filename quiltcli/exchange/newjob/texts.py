@@ -6,8 +6,9 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from quiltcli.exchange.newjob.kinds import Ball, Wishes, kind_of
+from quiltcli.exchange.newjob.kinds import kind_of
 from quiltcli.exchange.newjob.stand import Stand
+from quiltcli.exchange.newjob.wishes import Ball, Wishes
 from quiltcli.job.display import DisplayFile, PanelSpec
 
 # A regular icosahedron of radius 1, to have something to see.
@@ -99,7 +100,7 @@ def scene_text(stand: Stand, content: str | None) -> str:
         behind = _point([round(c, 3) for c in aside])
         size, near = _number(stand.content), _point(stand.look_at)
         objects = (
-            "# Stand-ins of radius 1: put a mesh of your own here, OBJ, PLY, STL or glTF. A GLB from\n"
+            "# Stand-ins of radius 1: put a mesh of your own here, OBJ, PLY, STL, glTF or USD. A GLB from\n"
             "# Blender needs neither units nor up_axis; others may want units: mm or up_axis: z there.\n"
             "objects:\n"
             f"- {{name: near, mesh: content.obj, transform: {{scale: {size}, translate: {near}}},"

@@ -12,10 +12,12 @@ import numpy as np
 from quiltcli.display import Facets, build_facets, load_display
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.exchange.newjob import texts
+from quiltcli.exchange.newjob.arenas import settled
 from quiltcli.exchange.newjob.figures import length_text
-from quiltcli.exchange.newjob.kinds import Ball, Panel, Wishes, check_wishes, kind_of
+from quiltcli.exchange.newjob.kinds import check_wishes, kind_of
 from quiltcli.exchange.newjob.plan import PAPER, draw_plan
 from quiltcli.exchange.newjob.stand import Stand, stand_for
+from quiltcli.exchange.newjob.wishes import Ball, Panel, Wishes
 from quiltcli.formats.drawing.png import write_png
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.whole import make_folder, write_text
@@ -57,9 +59,12 @@ def new_job(wishes: Wishes, folder: Path) -> NewJob:
         DisplayError, LayoutError: panels that are no facets, or do not fit the canvas.
     """
     check_wishes(wishes)
+    wishes, kind = settled(wishes), kind_of(wishes)
+    if kind.arrange is not None:
+        wishes = kind.arrange(wishes)
     frames = parse_frames(wishes.frames)
     content = _content(wishes, folder)
-    files, facets = _display(wishes, kind_of(wishes).build(wishes), folder)
+    files, facets = _display(wishes, kind.build(wishes), folder)
     stand = stand_for(wishes, facets)
     layout = None
     if wishes.canvas is not None:

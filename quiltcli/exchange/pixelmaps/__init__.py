@@ -8,6 +8,7 @@ from quiltcli.exchange.pixelmaps.formats import (
     read_map,
     write_map,
 )
+from quiltcli.exchange.pixelmaps.mpcdi3d import holds_surfaces, read_surfaces
 from quiltcli.exchange.pixelmaps.naming import facet_label, page_files, parse_label
 from quiltcli.exchange.pixelmaps.xyz import write_display_map
 
@@ -15,11 +16,13 @@ __all__ = [
     "FORMATS",
     "Format",
     "facet_label",
+    "holds_surfaces",
     "imported_map",
     "known_display",
     "page_files",
     "parse_label",
     "read_map",
+    "read_surfaces",
     "write_display_map",
     "write_map",
 ]

@@ -48,16 +48,17 @@ def write_mpcdi(layout: Layout, facets: Facets | None, path: Path, *, version: i
     """Write the archive; quilt.json holds what MPCDI has no place for, and may be deleted (OutputError)."""
     owners = pixel_owners(layout)
     with whole_file(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        _add(archive, XML, mpcdi_xml(layout, facets, version).encode())
-        _add(archive, SUPPLEMENT, json_text(layout, facets).encode())
+        add_member(archive, XML, mpcdi_xml(layout, facets, version).encode())
+        add_member(archive, SUPPLEMENT, json_text(layout, facets).encode())
         for row in placed_rows(layout):
             label = _label(layout, facets, row)
-            _add(archive, f"{label}.pfm", pfm_bytes(_warp(layout, row)))
-            _add(archive, f"{label}_alpha.png", _alpha(layout, row, owners))
+            add_member(archive, f"{label}.pfm", pfm_bytes(_warp(layout, row)))
+            add_member(archive, f"{label}_alpha.png", _alpha(layout, row, owners))
     return [path]
 
 
-def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
+def add_member(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
+    """Add a file to an archive, with the same bytes whenever that is done."""
     entry = zipfile.ZipInfo(name, _LONG_AGO)
     entry.compress_type = zipfile.ZIP_DEFLATED
     archive.writestr(entry, data, compresslevel=6)

@@ -111,8 +111,8 @@ class Region:
     extent: FloatArray
 
 
-def read_root(archive: Archive) -> ElementTree.Element:
-    """The root of mpcdi.xml, of the 2D media profile (LayoutError)."""
+def parsed_root(archive: Archive) -> ElementTree.Element:
+    """The root of mpcdi.xml, of any profile (LayoutError)."""
     text = archive.read(XML, _XML_BYTES)
     try:
         root = ElementTree.fromstring(text)
@@ -126,6 +126,12 @@ def read_root(archive: Archive) -> ElementTree.Element:
         ) from None
     if root.tag.lower() != "mpcdi":
         raise LayoutError(Problem(f"{XML} holds <{root.tag}>, expected <MPCDI>", file=str(archive.path)))
+    return root
+
+
+def read_root(archive: Archive) -> ElementTree.Element:
+    """The root of mpcdi.xml, of the 2D media profile (LayoutError)."""
+    root = parsed_root(archive)
     profile = attributes(root).get("profile", "")
     if profile.lower() != "2d":
         message = f"{XML} is of the profile {profile!r}, expected 2d (a media picture cut into regions)"

@@ -11,19 +11,18 @@ from typing import TypeAlias
 
 import numpy as np
 
-from quiltcli.display import demand_flat
 from quiltcli.errors import JobError, OutputError, Problem, raise_all
 from quiltcli.exchange.elsewhere import Made, MadeOptions, prepare_made, write_made
 from quiltcli.exchange.project.lenses import Lens
 from quiltcli.exchange.project.master import Master, loaded
+from quiltcli.exchange.project.sights import Rays, facet_rays, shown_pixels
 from quiltcli.exchange.project.stmap import write_st_maps
 from quiltcli.exchange.project.texels import Texels
 from quiltcli.exchange.project.tiles import TILE, Window, tile_light
 from quiltcli.formats.inputs import is_regular
-from quiltcli.geometry import FloatArray, IntArray
+from quiltcli.geometry import IntArray
 from quiltcli.images.facets import page_of, surroundings
 from quiltcli.job import JobFile
-from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.report import FrameRecord
@@ -71,7 +70,6 @@ def project(
     if master.stereo and not job.is_stereo:
         raise JobError("--stereo is for two eyes (the job has one; viewer.stereo gives it two)")
     ready = prepare_made(job, options, f"project {master.kind}")
-    demand_flat(ready.stage.facets, "quilt project")
     raise_all(OutputError, _missing(ready, master))
     threads = options.threads or default_threads()
     with ThreadPoolExecutor(threads) as pool:
@@ -120,18 +118,18 @@ def _lookup(master: Master, kept: Kept, view: View) -> tuple[Lens, Texels]:
     return master.lens(view, kept[key].size), kept[key]
 
 
-def _bands(stage: Stage, view: View) -> Iterator[tuple[int, Window, FloatArray]]:
+def _bands(stage: Stage, view: View) -> Iterator[tuple[int, Window, Rays]]:
     """Rows of tiles on the pages: the facet's row in the layout, a window, and its rays."""
     for viewer in view.viewers:
         lit = their_lit_facets(stage.facets, viewer) & (stage.layout.page >= 0)
-        rays = eye_from_quilt(stage.layout, viewer.eye)
+        rays = facet_rays(stage, viewer)
         for row in np.flatnonzero(lit).tolist():
             whole = Window(*surroundings(stage.layout, row, stage.job.render.bleed + 1))
             for band in whole.tiles(whole.x1 - whole.x0, TILE[1]):
                 yield row, band, rays[row]
 
 
-def _band(task: Projected, row: int, band: Window, rays: FloatArray) -> tuple[int, int]:
+def _band(task: Projected, row: int, band: Window, rays: Rays) -> tuple[int, int]:
     """Fill a row of tiles; the facet's pixels in it, and how many of them show the picture."""
     layout = task.stage.layout
     page, facet = int(layout.page[row]), layout.facet[row]
@@ -143,6 +141,9 @@ def _band(task: Projected, row: int, band: Window, rays: FloatArray) -> tuple[in
         owner: IntArray = owners[spot]
         inside = owner == facet
         mine = inside | (owner == -facet)
+        shown = shown_pixels(rays, *tile.centres())
+        if shown is not None:
+            inside, mine = inside & shown, mine & shown
         if not mine.any():
             continue
         values = tile_light(tile, rays, task.lens, task.texels).astype(np.float16)

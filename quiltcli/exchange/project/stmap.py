@@ -9,13 +9,13 @@ import numpy as np
 
 from quiltcli.errors import JobError, OutputError, Problem
 from quiltcli.exchange.project.master import Master, loaded
+from quiltcli.exchange.project.sights import facet_rays, shown_pixels
 from quiltcli.exchange.project.tiles import Window, places
 from quiltcli.formats.exr.image import write_exr
 from quiltcli.formats.whole import make_folder
 from quiltcli.geometry import Float32Array
 from quiltcli.images.facets import page_of, surroundings
 from quiltcli.images.names import quilt_path
-from quiltcli.projection.planar import eye_from_quilt
 from quiltcli.render.sequence import Prepared
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import their_lit_facets
@@ -57,13 +57,15 @@ def _maps(stage: Stage, master: Master, view: View, size: tuple[int, int]) -> li
     lens = master.lens(view, size)
     flat = np.zeros((4, stage.owners.size), dtype=np.float32)
     for viewer in view.viewers:
-        rays = eye_from_quilt(layout, viewer.eye)
+        rays = facet_rays(stage, viewer)
         lit = their_lit_facets(stage.facets, viewer) & (layout.page >= 0)
         for row in np.flatnonzero(lit).tolist():
             window = Window(*surroundings(layout, row, stage.job.render.bleed + 1))
             spot = slice(window.y0, window.y1), slice(window.x0, window.x1)
             page = int(layout.page[row])
             mine = np.abs(page_of(stage.owners, layout, page)[spot]) == layout.facet[row]
+            shown = shown_pixels(rays[row], *window.centres())
+            mine = mine if shown is None else mine & shown
             place = places(window, rays[row], lens)
             values = (place.x / size[0], 1 - place.y / size[1], np.zeros_like(place.x), place.inside)
             for channel, value in zip(flat, values, strict=True):

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quiltcli.exchange.project.lenses import Lens, Place
+from quiltcli.exchange.project.sights import Rays, directions_at, moved, slopes_at
 from quiltcli.exchange.project.texels import Texels
 from quiltcli.geometry import Float32Array, FloatArray
 
@@ -44,6 +45,11 @@ class Window:
         """Width and height."""
         return self.x1 - self.x0, self.y1 - self.y0
 
+    def centres(self) -> tuple[FloatArray, FloatArray]:
+        """Centres of its pixels: (w,) across and (h, 1) down."""
+        x, y = (np.arange(a, b, dtype=np.float64) for a, b in ((self.x0, self.x1), (self.y0, self.y1)))
+        return x + 0.5, y[:, None] + 0.5
+
     def tiles(self, across: int, down: int) -> Iterator[Window]:
         """Windows of at most so many pixels that make it up."""
         for y in range(self.y0, self.y1, down):
@@ -51,12 +57,12 @@ class Window:
                 yield Window(x, y, min(x + across, self.x1), min(y + down, self.y1))
 
 
-def tile_light(window: Window, rays: FloatArray, lens: Lens, texels: Texels) -> Float32Array:
+def tile_light(window: Window, rays: Rays, lens: Lens, texels: Texels) -> Float32Array:
     """Light (h, w, 4) of a window's pixels, premultiplied; alpha is the share that the picture shows.
 
     Args:
         window: pixels of a page.
-        rays: (3, 3) page pixel (x, y, 1) → direction from the eye.
+        rays: page pixel → direction from the eye.
         lens: where directions lie in the picture.
         texels: the picture.
     """
@@ -82,23 +88,20 @@ def tile_light(window: Window, rays: FloatArray, lens: Lens, texels: Texels) -> 
     return light.reshape(height, width, 4)
 
 
-def directions(window: Window, rays: FloatArray) -> FloatArray:
+def directions(window: Window, rays: Rays) -> FloatArray:
     """Directions (3, h, w) of the pixels' centres."""
-    x = np.arange(window.x0, window.x1) + 0.5
-    y = np.arange(window.y0, window.y1)[:, None] + 0.5
-    result: FloatArray = np.stack([row[0] * x + row[1] * y + row[2] for row in rays])
-    return result
+    return directions_at(rays, *window.centres())
 
 
-def _counts(window: Window, rays: FloatArray, lens: Lens) -> tuple[int, int]:
+def _counts(window: Window, rays: Rays, lens: Lens) -> tuple[int, int]:
     """Samples across and down for the longest steps in texels at 5 × 5 places over a window."""
     x = np.linspace(window.x0 + 0.5, window.x1 - 0.5, 5)
     y = np.linspace(window.y0 + 0.5, window.y1 - 0.5, 5)[:, None]
-    d = np.stack([row[0] * x + row[1] * y + row[2] for row in rays])
+    d = directions_at(rays, x, y)
     inside = lens.place(d).inside
     if not inside.any():
         inside[:] = True  # only a corner of the picture lies between these places
-    steps = (lens.steps(d, rays[:, k]) for k in (0, 1))
+    steps = (lens.steps(d, slope) for slope in slopes_at(rays, x, y))
     x_side, y_side = (float(np.hypot(step.x, step.y)[inside].max()) for step in steps)
     return _samples(x_side), _samples(y_side)
 
@@ -107,19 +110,19 @@ def _samples(side: float) -> int:
     return int(np.clip(np.ceil(side / np.sqrt(_TENT2) - 1e-6), 1, MOST)) if np.isfinite(side) else MOST
 
 
-def _blur(window: Window, rays: FloatArray, lens: Lens) -> tuple[float, float]:
+def _blur(window: Window, rays: Rays, lens: Lens) -> tuple[float, float]:
     """B of the cubics across and down the picture, for the middle of a window."""
-    middle = np.array([(window.x0 + window.x1) / 2, (window.y0 + window.y1) / 2, 1.0])
-    d = np.stack([row[0] * middle[0] + row[1] * middle[1] + row[2] for row in rays])[:, None]
-    across, down = (lens.steps(d, rays[:, k]) for k in (0, 1))
+    x, y = np.array([(window.x0 + window.x1) / 2]), np.array([(window.y0 + window.y1) / 2])
+    d = directions_at(rays, x, y)
+    across, down = (lens.steps(d, slope) for slope in slopes_at(rays, x, y))
     sizes = (np.hypot(across.x, down.x)[0], np.hypot(across.y, down.y)[0])
-    x, y = (float(np.clip((size * size - 1) / 2, 0, 0.5)) for size in sizes)
-    return x, y
+    blur = [float(np.clip((size * size - 1) / 2, 0, 0.5)) for size in sizes]
+    return blur[0], blur[1]
 
 
 def _boxed(
     window: Window,
-    rays: FloatArray,
+    rays: Rays,
     lens: Lens,
     texels: Texels,
     d: FloatArray,
@@ -127,8 +130,9 @@ def _boxed(
 ) -> Float32Array:
     """Mean light (P, 4) of samples over the pixels' boxes."""
     spread = []
-    for k in (0, 1):
-        step = lens.steps(d, rays[:, k])
+    slopes = slopes_at(rays, *window.centres())
+    for slope in slopes:
+        step = lens.steps(d, slope)
         square = np.maximum(step.x * step.x + step.y * step.y, 1e-30)
         spread.append(np.sqrt(np.clip(1 - _TENT2 / square, 0, 1)))
     light = np.zeros((d[0].size, 4), dtype=np.float32)
@@ -136,8 +140,7 @@ def _boxed(
         down = ((j + 0.5) / count[1] - 0.5) * spread[1]
         for i in range(count[0]):
             across = ((i + 0.5) / count[0] - 0.5) * spread[0]
-            moved = d + rays[:, 0, None, None] * across + rays[:, 1, None, None] * down
-            place = lens.place(moved.reshape(3, -1))
+            place = lens.place(moved(d, slopes, across, down).reshape(3, -1))
             one = texels.linear(place)
             if not place.inside.all():
                 one *= place.inside[:, None]
@@ -146,6 +149,6 @@ def _boxed(
     return light
 
 
-def places(window: Window, rays: FloatArray, lens: Lens) -> Place:
+def places(window: Window, rays: Rays, lens: Lens) -> Place:
     """Where the centres of a window's pixels lie in the picture, (h, w)."""
     return lens.place(directions(window, rays))

@@ -13,6 +13,7 @@ from quiltcli.exchange.web.ghost import Ghost
 from quiltcli.exchange.web.html import packed
 from quiltcli.exchange.web.mesh import DisplayMesh
 from quiltcli.images.preview import tone_map
+from quiltcli.viewer.viewer import Viewer
 
 # As `quilt simulate` draws them: what is around, and screens that are off, edge-on and face-on.
 _GREYS = np.array([[0.05, 0.052, 0.056], [0.035 * 0.25] * 3, [0.035] * 3])
@@ -40,7 +41,10 @@ def page_data(
         "sizes": folder.stage.layout.size.tolist(),
         "path": packed((eye_path(folder) - mesh.centre).astype(np.float32)),
         "ghost": _ghost_data(ghost),
-        "frames": [_frame_data(frame, mesh) for frame in seen],
+        "frames": [
+            {**_frame_data(frame, mesh), **_carried(folder, seen[0].viewer, frame.viewer, mesh)}
+            for frame in seen
+        ],
     }
 
 
@@ -50,6 +54,13 @@ def display_name(folder: Folder) -> str:
 
 
 def _mesh_data(mesh: DisplayMesh) -> dict[str, Any]:
+    curved = {}
+    if mesh.bent.any():
+        curved = {
+            "bent": packed(mesh.bent.astype(np.uint8)),
+            "facing": packed(mesh.facing),
+            "edges": packed(mesh.edges.astype(np.uint32)),
+        }
     return {
         "position": packed(mesh.position),
         "quilt": packed(mesh.quilt),
@@ -59,6 +70,7 @@ def _mesh_data(mesh: DisplayMesh) -> dict[str, Any]:
         "page": packed(mesh.page),
         "normal": packed(mesh.normal),
         "both": mesh.both_sides,
+        **curved,
     }
 
 
@@ -70,6 +82,18 @@ def _ghost_data(ghost: Ghost | None) -> dict[str, str] | None:
         "color": packed(np.rint(ghost.color * 255).astype(np.uint8)),
         "triangles": packed(ghost.triangles.astype(np.uint32)),
     }
+
+
+def _carried(folder: Folder, first: Viewer, viewer: Viewer, mesh: DisplayMesh) -> dict[str, Any]:
+    """How a projection has gone along with the viewer since the first frame: a 4 × 4 matrix, by columns."""
+    charts = [chart for chart in folder.stage.facets.charts if chart is not None and not chart.stands]
+    if not charts:
+        return {}
+    matrix = np.eye(4)
+    if charts[0].follows == "view":
+        matrix[:3, :3] = viewer.camera_from_world.T @ first.camera_from_world
+    matrix[:3, 3] = viewer.eye - mesh.centre - matrix[:3, :3] @ (first.eye - mesh.centre)
+    return {"carried": matrix.T.reshape(-1).tolist()}
 
 
 def _frame_data(frame: FrameView, mesh: DisplayMesh) -> dict[str, Any]:

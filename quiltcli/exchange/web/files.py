@@ -18,6 +18,7 @@ from quiltcli.exchange.web.model import model
 from quiltcli.exchange.web.textures import Coding, Picture, extents, factor
 from quiltcli.formats.whole import make_folder, whole_file, write_text
 from quiltcli.job.frames import format_frames
+from quiltcli.viewer.view import views_at
 
 MOST_FRAMES = 24
 """Frames a page holds unless one asks for more."""
@@ -60,15 +61,16 @@ def view(
         raise OutputError(Problem("a page's name must end in .html", file=str(output)))
     folder = open_folder(path)
     numbers = chosen_frames(folder, frames, MOST_FRAMES)
-    mesh = display_mesh(folder.stage.facets, folder.stage.layout)
+    first = views_at(folder.stage.job, numbers[0])[0].viewer
+    mesh = display_mesh(folder.stage.facets, folder.stage.layout, first)
     shade = ghost(folder.stage.scene, mesh.centre, options.ghost)
     seen = [frame_view(folder, number, options.errors) for number in numbers]
     make_folder(output.parent)
-    coding, first = _write_page(output, folder, mesh, seen, shade, options)
+    coding, pictures = _write_page(output, folder, mesh, seen, shade, options)
     lines = [("page", f"{output} ({output.stat().st_size / 1e6:.1f} MB)")]
     written = output.with_suffix(".glb") if options.model else None
     if written is not None:
-        _write_model(written, folder, mesh, seen[0], shade, coding, first)
+        _write_model(written, folder, mesh, seen[0], shade, coding, pictures)
         lines += [("model", f"{written} ({written.stat().st_size / 1e6:.1f} MB), frame {numbers[0]}")]
     lines += [
         ("frames", _frame_words(folder, numbers)),

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.analysis.simulate.picture import with_channels
-from quiltcli.display import demand_flat, lit_facets
+from quiltcli.display import lit_facets
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.exr.image import read_header
 from quiltcli.images.metadata import is_complete
@@ -47,7 +47,6 @@ def open_folder(path: Path) -> Folder:
         raise OutputError(Problem(wrong, file=str(path)))
     job = load_job(path / "job.yaml")
     stage = set_stage(with_channels(job, ("rgba",)))
-    demand_flat(stage.facets, "quilt view")
     frames = tuple(sorted({name.frame for name, _ in stage.names.found(path)}))
     if not frames:
         raise OutputError(Problem("has no images of frames (run quilt render first)", file=str(path)))

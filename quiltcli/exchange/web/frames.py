@@ -9,6 +9,7 @@ import numpy as np
 from quiltcli.analysis.simulate import PictureOptions, figures, heat_map, heat_scale, take_picture
 from quiltcli.analysis.simulate.images import shown_images
 from quiltcli.analysis.simulate.lookup import Shown
+from quiltcli.analysis.simulate.skin import skin_of
 from quiltcli.display import lit_facets
 from quiltcli.exchange.web.folder import Folder, images_sha
 from quiltcli.exchange.web.textures import Picture, picture
@@ -80,7 +81,8 @@ def frame_view(folder: Folder, frame: int, errors: bool) -> FrameView:
     """What is seen in a frame, and how far off it is where `errors` are asked for."""
     stage = folder.stage
     viewer = stage.views([frame])[0].viewer
-    camera, fov = frame_display(viewer, stage.facets.corners, ASPECT, turn=True)
+    corners = skin_of(stage.facets, viewer).vertices if stage.facets.charts else stage.facets.corners
+    camera, fov = frame_display(viewer, corners, ASPECT, turn=True)
     lit = lit_facets(stage.facets, viewer.eye) & (stage.layout.page >= 0)
     found = FrameView(viewer, camera, fov, lit, None, ())
     return _with_errors(folder, found) if errors else found

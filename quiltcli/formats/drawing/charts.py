@@ -111,6 +111,16 @@ class _Frame:
 
     def grid(self, labels: tuple[str, str]) -> list[str]:
         """Lines and numbers of both axes."""
+        height = self.size[1]
+        marks = []
+        for value in ticks(*self.across):
+            x = self.x(value)
+            marks.append(_line(x, height - _BOTTOM, x, height - _BOTTOM + 5, _INK))
+            marks.append(_text(x, height - _BOTTOM + 18, f"{value:g}", "middle"))
+        return self.levels(labels, marks)
+
+    def levels(self, labels: tuple[str, str], marks: Sequence[str] = ()) -> list[str]:
+        """Lines and numbers of the axis up, marks of the axis across, labels of both."""
         width, height = self.size
         parts = []
         for value in ticks(*self.up):
@@ -119,10 +129,7 @@ class _Frame:
                 _line(_LEFT, y, width - _RIGHT, y, _FAINT),
                 _text(_LEFT - 8, y + 4, f"{value:g}", "end"),
             ]
-        for value in ticks(*self.across):
-            x = self.x(value)
-            parts.append(_line(x, height - _BOTTOM, x, height - _BOTTOM + 5, _INK))
-            parts.append(_text(x, height - _BOTTOM + 18, f"{value:g}", "middle"))
+        parts += marks
         parts.append(_text((_LEFT + width - _RIGHT) / 2, height - 6, labels[0], "middle"))
         middle = (_TOP + height - _BOTTOM) / 2
         turned = f' transform="rotate(-90 14 {middle:.1f})"'
@@ -161,6 +168,62 @@ def bar_chart(
         parts.append(_text(x + 17, 16, name))
         x += 34 + 7 * len(name)
     return _document((width, 40 + len(rows) * step), parts)
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Bars of one colour in a chart of groups.
+
+    Attributes:
+        name: for the legend.
+        values: (N,) a bar in each group, not a number where there is none.
+        spread: (N, 2) lower and upper end of the mark about each bar's end, such as an interval of
+            confidence; not numbers where there is none. None for no marks.
+    """
+
+    name: str
+    values: FloatArray
+    spread: FloatArray | None = None
+
+
+def group_chart(
+    labels: Sequence[str], bars: Sequence[Bars], up: str, size: tuple[int, int] = (860, 380)
+) -> str:
+    """Upright bars side by side in groups.
+
+    Args:
+        labels: (N,) of the groups.
+        bars: one of each stands in every group.
+        up: label of the axis up.
+        size: width and height, CSS pixels.
+    """
+    ends = np.concatenate([np.append(one.values, [] if one.spread is None else one.spread) for one in bars])
+    ends = ends[np.isfinite(ends)]
+    low, high = min(float(ends.min(initial=0.0)), 0.0), float(ends.max(initial=0.0))
+    frame = _Frame(size, (0.0, float(len(labels))), (low, (high * 1.05) or 1.0))
+    parts = frame.levels(("", up))
+    wide = 0.8 / len(bars)
+    for k, one in enumerate(bars):
+        color = COLORS[k % len(COLORS)]
+        for group, value in enumerate(one.values.tolist()):
+            if not math.isfinite(value):
+                continue
+            x0, x1 = (frame.x(group + 0.1 + wide * (k + side)) for side in (0.04, 0.96))
+            top, bottom = frame.y(max(value, 0.0)), frame.y(min(value, 0.0))
+            at = f'x="{x0:.1f}" y="{top:.1f}" width="{x1 - x0:.1f}" height="{bottom - top:.1f}"'
+            parts.append(f'<rect {at} fill="{color}"/>')
+            if one.spread is not None and np.isfinite(one.spread[group]).all():
+                middle, y0, y1 = (x0 + x1) / 2, *(frame.y(end) for end in one.spread[group].tolist())
+                cap = min(5.0, (x1 - x0) / 3)
+                parts += [_line(middle, y0, middle, y1, _INK)]
+                parts += [_line(middle - cap, y, middle + cap, y, _INK) for y in (y0, y1)]
+        y = _TOP + 10 + 20 * k
+        left = size[0] - _RIGHT + 12
+        parts.append(f'<rect x="{left}" y="{y - 6}" width="12" height="12" fill="{color}"/>')
+        parts.append(_text(left + 18, y + 4, one.name))
+    for group, label in enumerate(labels):
+        parts.append(_text(frame.x(group + 0.5), size[1] - _BOTTOM + 18, label, "middle"))
+    return _document(size, parts)
 
 
 def _line(x0: float, y0: float, x1: float, y1: float, color: str, more: str = "") -> str:

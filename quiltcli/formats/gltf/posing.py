@@ -120,7 +120,7 @@ def placed(gltf: Gltf, piece: Piece, pose: Pose) -> Placed:
     """All copies of a piece in a pose."""
     primitive = piece.primitive
     if not len(primitive.moved) and all(shape.skin < 0 for shape in piece.shapes):
-        return _carried(primitive.positions, primitive.normals, piece.places(pose))
+        return carried(primitive.positions, primitive.normals, piece.places(pose))
     parts = [_one(gltf, primitive, shape, pose) for shape in piece.shapes]
     normals = [part.normals for part in parts if part.normals is not None]
     return Placed(
@@ -139,7 +139,7 @@ def _one(gltf: Gltf, primitive: Primitive, shape: Shape, pose: Pose) -> Placed:
             positions = positions + weight * moved
             normals = None if normals is None else normals + weight * turned
     if shape.skin < 0 or primitive.joints is None or primitive.weights is None:
-        return _carried(positions, normals, product(pose.world[shape.node][None], shape.instances))
+        return carried(positions, normals, product(pose.world[shape.node][None], shape.instances))
     skin = gltf.skins[shape.skin]
     joints = product(pose.world[skin.joints], skin.inverse_bind)
     # A skinned mesh is where its joints are; its own node's place is of no account.
@@ -159,7 +159,7 @@ def _one(gltf: Gltf, primitive: Primitive, shape: Shape, pose: Pose) -> Placed:
     )
 
 
-def _carried(positions: FloatArray, normals: FloatArray | None, places: FloatArray) -> Placed:
+def carried(positions: FloatArray, normals: FloatArray | None, places: FloatArray) -> Placed:
     """Copies of vertices at places (C, 4, 4)."""
     rows = places[:, None, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -174,7 +174,11 @@ def _carried(positions: FloatArray, normals: FloatArray | None, places: FloatArr
 
 def placed_triangles(piece: Piece, mirrored: BoolArray) -> IntArray:
     """Triangles (C·T, 3) of all copies; mirrored ones are wound the other way, so that out stays out."""
-    triangles, count = piece.primitive.triangles, len(piece.primitive.positions)
+    return copied_triangles(piece.primitive.triangles, len(piece.primitive.positions), mirrored)
+
+
+def copied_triangles(triangles: IntArray, count: int, mirrored: BoolArray) -> IntArray:
+    """Triangles (C·T, 3) of copies of (T, 3) over `count` vertices each, mirrored ones (C,) turned over."""
     copies = np.tile(triangles, (len(mirrored), 1, 1))
     copies[mirrored] = copies[mirrored][..., ::-1]
     base = count * np.arange(len(mirrored))

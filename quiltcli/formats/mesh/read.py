@@ -15,6 +15,8 @@ from quiltcli.formats.mesh.obj import read_obj
 from quiltcli.formats.mesh.off import read_off
 from quiltcli.formats.mesh.ply import read_ply
 from quiltcli.formats.mesh.stl import read_stl
+from quiltcli.formats.mesh.usd import read_usd_mesh
+from quiltcli.formats.usd import SUFFIXES as USD_SUFFIXES
 
 READERS: Mapping[str, Callable[[bytes, Path], PolygonMesh]] = {
     ".obj": read_obj,
@@ -24,13 +26,19 @@ READERS: Mapping[str, Callable[[bytes, Path], PolygonMesh]] = {
 }
 """Our own readers, by suffix: of a file's bytes, and of its path for what it names beside it."""
 
-SUFFIXES = (*READERS, ".glb", ".gltf")
+MODELS: Mapping[str, Callable[[Path], PolygonMesh]] = {
+    **dict.fromkeys((".glb", ".gltf"), read_gltf_mesh),
+    **dict.fromkeys(USD_SUFFIXES, read_usd_mesh),
+}
+"""Readers of scenes, whose faces a display can be made of."""
+
+SUFFIXES = (*READERS, *MODELS)
 
 
 def read_mesh(path: Path | str) -> PolygonMesh:
     """Read a display mesh, every face whole and in file order.
 
-    OBJ, PLY and OFF keep polygons of any size. STL and glTF hold triangles; of glTF, primitives
+    OBJ, PLY, OFF and USD keep polygons of any size. STL and glTF hold triangles; of glTF, primitives
     come in file order and instances of one primitive in the order of their transforms.
 
     Raises:
@@ -42,7 +50,7 @@ def read_mesh(path: Path | str) -> PolygonMesh:
         raise _error(path, fault)
     if suffix not in SUFFIXES:
         raise _error(path, f"unknown mesh format {path.suffix!r} (expected {', '.join(SUFFIXES)})")
-    mesh = read_polygons(path) if suffix in READERS else read_gltf_mesh(path)
+    mesh = read_polygons(path) if suffix in READERS else MODELS[suffix](path)
     check_display_mesh(mesh)
     return mesh
 

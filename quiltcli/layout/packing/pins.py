@@ -48,7 +48,7 @@ def _placed_by_display(facets: Facets, given: Layout | None, wishes: PackSpec) -
     on = np.flatnonzero(free)
     if not on.size:
         return None
-    size = wishes.size or (given.pages[-1] if given is not None and len(given.facet) else None)
+    size = wishes.size or (given.pages[-1] if given is not None and len(given.facet) else places.page_size)
     if size is None:
         message = "a facet with a place needs a page of a given size (--size, or size under layout:)"
         raise LayoutError(places.problem(("facets", int(places.facet[on[0]])), message))

@@ -11,8 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from quiltcli.display import eyes_apart
 from quiltcli.geometry import BoolArray
 from quiltcli.render.buffers import Buffers
+from quiltcli.render.corrections import Headroom, correct, corrects
 from quiltcli.render.crew import Crew
 from quiltcli.render.frame import Exposure, TooNearError
 from quiltcli.render.frame import draw_frame as rasterize_frame
@@ -20,8 +22,9 @@ from quiltcli.render.methods.cubemap import draw_cubemap
 from quiltcli.render.methods.raycast import cast_frame
 from quiltcli.render.methods.tessellate import draw_tessellated
 from quiltcli.render.methods.twopass import draw_twice
+from quiltcli.render.methods.unsorted import draw_by_octree, draw_independently
 from quiltcli.render.moments import Moment
-from quiltcli.render.report import FrameRecord, together
+from quiltcli.render.report import Clock, FrameRecord, together
 from quiltcli.render.setup import Stage
 from quiltcli.viewer.view import View
 from quiltcli.viewer.viewer import Viewer
@@ -33,8 +36,10 @@ OTHERS: dict[str, Callable[[Stage, Viewer, Buffers, int, BoolArray | None], Fram
     "raycast": cast_frame,
     "cubemap": draw_cubemap,
     "tessellate": draw_tessellated,
+    "octree": draw_by_octree,
+    "independent": draw_independently,
 }
-"""Methods that do not rasterize the quilt."""
+"""Methods that do not rasterize the quilt, and those that do without sorting triangles to facets."""
 
 
 def draw_frame(
@@ -50,6 +55,8 @@ def draw_frame(
 ) -> FrameRecord:
     """Draw what the viewer sees on every lit facet, by the job's method; see `frame.draw_frame`."""
     other = OTHERS.get(stage.job.render.method)
+    if other is None and eyes_apart(stage.facets):
+        other = cast_frame
     if other is not None:
         return other(stage, viewer, buffers, threads, only)
     try:
@@ -88,8 +95,30 @@ def draw_moment(
         records.append(
             draw_frame(stage, viewer, buffers, threads, theirs, dirty=dirty, crew=crew, exposures=open_for)
         )
-    record = together(records)
+    record = corrected(stage, view, buffers, together(records), threads, only)
     return replace(record, eye=view.eye, warnings=(*record.warnings, *moment.warnings))
+
+
+def corrected(
+    stage: Stage, view: View, buffers: Buffers, record: FrameRecord, threads: int, only: BoolArray | None
+) -> FrameRecord:
+    """Correct what was drawn for the panels, if the job wants that; the record with what it took."""
+    response = corrects(stage)
+    if response is None:
+        return record
+    clock = Clock()
+    with clock.stage("correct"):
+        parts = [
+            correct(stage, viewer, buffers, threads, theirs)
+            for viewer, theirs in facets_by_viewer(view, stage.facets.count, only)
+        ]
+    headroom = sum(parts, Headroom())
+    return replace(
+        record,
+        seconds={**record.seconds, **clock.seconds},
+        warnings=(*record.warnings, *headroom.words(response)),
+        corrections=headroom.as_json(),
+    )
 
 
 def facets_by_viewer(

@@ -20,8 +20,8 @@ from functools import partial
 
 import numpy as np
 
-from quiltcli.display import lit_facets
-from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray
+from quiltcli.display import eyes_apart, lit_facets
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, dot
 from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.batch import put_layers
@@ -117,7 +117,15 @@ def target_of(stage: Stage, viewer: Viewer) -> Target:
         how.backface_culling,
         one_sided=scene.one_sided if how.double_sided == "file" else None,
         invisible=scene.invisible,
+        beside=_beside(stage, viewer),
     )
+
+
+def _beside(stage: Stage, viewer: Viewer) -> float:
+    """How far from the eye rays may begin, metres: where each has an eye of its own."""
+    if viewer.head is None or not eyes_apart(stage.facets):
+        return 0.0
+    return 2 * float(np.sqrt(dot(viewer.eye - viewer.head, viewer.eye - viewer.head)))
 
 
 def pixels_of(stage: Stage, lit: BoolArray) -> Iterator[IntArray]:
@@ -164,7 +172,8 @@ def ray_hits(
         sloped: whether textures are looked up.
     """
     ray = pixels.rays()
-    position = ray * plane_distance(target, triangle, ray)[:, None]
+    seen = ray * plane_distance(target, triangle, ray, pixels.origin)[:, None]
+    position = seen if pixels.origin is None else pixels.origin + seen
     points = np.ascontiguousarray(position.T)
     return point_hits(
         first=pixels.address,
@@ -172,10 +181,11 @@ def ray_hits(
         triangle=triangle.astype(np.int32),
         position=points,
         weights=np.stack(barycentric(target, triangle, position)),
-        depth=target.viewer.depth_of(points),
+        depth=target.viewer.depth_of(np.ascontiguousarray(seen.T)),
         normals=normals,
         inside=int(np.count_nonzero(~pixels.bleed)),
-        slopes=weight_slopes(target, triangle, pixels.ray, ray, position) if sloped else None,
+        slopes=weight_slopes(target, triangle, pixels.ray, ray, seen) if sloped else None,
+        ray=None if pixels.origin is None else np.ascontiguousarray(ray.T),
     )
 
 
@@ -187,8 +197,8 @@ def first_triangles(
     Returns:
         the triangles, and the pixels (P,) near which the first may be passed.
     """
-    named = np.stack([cast(target, pixels.directions(*offset)) for offset in OFFSETS])
-    back = _looking_back(target, pixels.directions(), named[0])
+    named = np.stack([cast(target, pixels.directions(*way), origin=pixels.origin) for way in OFFSETS])
+    back = _looking_back(target, pixels, pixels.directions(), named[0])
     every = np.concatenate((named, back[None]))
     result: IntArray = np.maximum(named[0], -1)
     rows = np.flatnonzero((every != every[0]).any(axis=0))
@@ -246,13 +256,13 @@ def met_through(target: Target, neighbours: Neighbours, pixels: Places, soft: Bo
         directions = pixels.directions(*offset)
         live, start = np.arange(len(directions)), np.zeros(len(directions))
         while live.size:
-            ray = directions[live]
-            met = cast(target, ray, start)
-            back = _looking_back(target, ray, met)
+            ray, some = directions[live], pixels.take(live)
+            met = cast(target, ray, start, some.origin)
+            back = _looking_back(target, some, ray, met)
             hit = np.flatnonzero(met >= 0)
             rows += [live[hit], live[back >= 0]]
             named += [met[hit], back[back >= 0]]
-            distance = plane_distance(target, met[hit], ray[hit])
+            distance = plane_distance(target, met[hit], ray[hit], some.from_eye(hit))
             going = soft[met[hit]] & np.isfinite(distance)
             start = np.maximum(distance, start[hit])[going] * (1 + _PAST) + _PAST * 1e-3
             live = live[hit[going]]
@@ -260,18 +270,19 @@ def met_through(target: Target, neighbours: Neighbours, pixels: Places, soft: Bo
     return Met(pixels.address.size, *tests)
 
 
-def _looking_back(target: Target, directions: FloatArray, first: IntArray) -> IntArray:
-    """What rays (P, 3) from just behind their first hits (P,) towards the eye meet.
+def _looking_back(target: Target, pixels: Places, directions: FloatArray, first: IntArray) -> IntArray:
+    """What rays (P, 3) of P pixels from just behind their first hits (P,) towards the eye meet.
 
     Where that is nothing, or nothing was hit, it is `first` itself.
     """
     result: IntArray = first.copy()
     rows = np.flatnonzero(first >= 0)
     if rows.size:
-        distance = plane_distance(target, first[rows], directions[rows]) * (1 + _BEHIND)
+        ray, begin = directions[rows], pixels.from_eye(rows)
+        distance = plane_distance(target, first[rows], ray, begin) * (1 + _BEHIND)
         distance = np.where(np.isfinite(distance), distance, 0.0)
-        origin = (distance[:, None] * directions[rows]).astype(np.float32)
-        met = target.embree.run(origin, (-directions[rows]).astype(np.float32)).astype(np.int64)
+        origin = distance[:, None] * ray if begin is None else begin + distance[:, None] * ray
+        met = target.embree.run(origin.astype(np.float32), (-ray).astype(np.float32)).astype(np.int64)
         result[rows[met >= 0]] = target.named[met[met >= 0]]
     return result
 
@@ -308,7 +319,7 @@ def _drawn_here(
     around, triangle = neighbours.around(row, named)
     tests = intersect(target, pixels, around, triangle, LATTICE)
     ray = pixels.directions()[around]
-    distance = plane_distance(target, triangle, ray)
+    distance = plane_distance(target, triangle, ray, pixels.from_eye(around))
     with np.errstate(invalid="ignore"):  # infinity times 0
         reach = distance * reach_along(target.viewer, ray)
     hit = np.flatnonzero((tests.inside >= 0) & (reach >= target.viewer.near) & (reach <= target.viewer.far))

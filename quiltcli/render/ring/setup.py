@@ -20,6 +20,7 @@ from quiltcli.ring.build import curve_of, rig_of, scene_problems
 from quiltcli.ring.cast import see_by_rays
 from quiltcli.ring.picture import See, Show
 from quiltcli.ring.raster import Mesh, mesh_of, see
+from quiltcli.ring.rebin import as_bits
 from quiltcli.ring.rig import Rig
 from quiltcli.ring.tones import shortest_dwell
 from quiltcli.ring.vertexwise import see_by_vertices
@@ -59,8 +60,9 @@ class RingStage:
 
     @property
     def halftone(self) -> HalftoneSpec:
-        """How tones become bits."""
-        return self.job.halftone or HalftoneSpec()
+        """How tones become bits; of photographs that are bits before, by copying them."""
+        spec = self.job.halftone or HalftoneSpec()
+        return HalftoneSpec(method="none", before=True) if spec.before else spec
 
     @property
     def positions(self) -> range:
@@ -112,6 +114,8 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
     photographs = None
     if job.lightfield is not None:
         photographs = load_field(load_lightfield_file(job.lightfield), frames)
+        if job.halftone is not None and job.halftone.before:
+            photographs = as_bits(photographs, job.halftone, colours=len(rig.streams) > 1)
         scene, source = empty_scene(), None
     else:
         store = TextureStore(texture_limits(job))

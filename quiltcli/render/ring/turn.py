@@ -28,6 +28,7 @@ from quiltcli.render.ring.outputs import tones_path, write_tones
 from quiltcli.render.ring.setup import RingStage
 from quiltcli.render.workers import shared_array
 from quiltcli.ring.picture import Counts, Show, draw_picture
+from quiltcli.ring.rig import Rig
 from quiltcli.ring.tones import tones_of
 
 
@@ -76,9 +77,9 @@ class Sheets:
     """A part's tones and bits, in shared memory.
 
     Attributes:
-        tones: (N, H, W) 0 to 1.
+        tones: (C, N, H, W) 0 to 1, by stream.
         inside: (N, H, W) pixels that light the mirror.
-        bits: (N, H, W) pixels that are on.
+        bits: (C, N, H, W) pixels that are on.
     """
 
     tones: NDArray[np.float16]
@@ -86,13 +87,13 @@ class Sheets:
     bits: BoolArray
 
 
-def new_sheets(count: int, size: tuple[int, int]) -> Sheets:
-    """Memory for some positions."""
-    shape = (count, size[1], size[0])
-    length = count * size[0] * size[1]
-    tones = shared_array(length, np.float16).reshape(shape)
-    inside, bits = (shared_array(length, np.bool_).reshape(shape) for _ in range(2))
-    return Sheets(tones, inside, bits)
+def new_sheets(rig: Rig, count: int) -> Sheets:
+    """Memory for so many positions."""
+    streams, shape = len(rig.streams), (count, rig.size[1], rig.size[0])
+    length = count * rig.size[0] * rig.size[1]
+    tones = shared_array(streams * length, np.float16).reshape(streams, *shape)
+    bits = shared_array(streams * length, np.bool_).reshape(streams, *shape)
+    return Sheets(tones, shared_array(length, np.bool_).reshape(shape), bits)
 
 
 def draw_tones(
@@ -125,7 +126,7 @@ def draw_tones(
         pictures = [draw_picture(show, angle, side) for side in range(len(stage.rig.sides))]
         start = time.perf_counter()
         tones = tones_of(stage.rig, pictures, stage.halftone, stage.shortest)
-        sheets.tones[row], sheets.inside[row] = tones.values, tones.inside
+        sheets.tones[:, row], sheets.inside[row] = tones.values, tones.inside
         for picture in pictures:
             counts.add(picture.counts)
         counts.seconds["tones"] = time.perf_counter() - start
@@ -155,7 +156,8 @@ def make_bits(
     def one(run: tuple[int, int]) -> None:
         rows = slice(*run)
         sequel = Sequel(part.positions[rows], step)
-        sheets.bits[rows] = halftone(sheets.tones[rows], sheets.inside[rows], spec, sequel)
+        for tones, bits in zip(sheets.tones, sheets.bits, strict=True):
+            bits[rows] = halftone(tones[rows], sheets.inside[rows], spec, sequel)
 
     count = len(part.positions)
     # An error that is handed on goes through all positions in order.
@@ -189,21 +191,24 @@ def write_bits(
     packing = stage.display.packing
     row_of = {position: row for row, position in enumerate(part.positions)}
 
-    def one(image: int) -> tuple[str, dict[str, object]]:
-        name, drawn = packed_name(number_of(stage, part.number, image)), positions_in(stage, image)
-        planes = np.zeros((PLANES, *sheets.bits.shape[1:]), dtype=np.bool_)
+    def one(which: tuple[int, int]) -> tuple[str, dict[str, object]]:
+        stream, image = which
+        name = packed_name(number_of(stage, part.number, image), stage.rig.streams[stream])
+        drawn, bits = positions_in(stage, image), sheets.bits[stream]
+        planes = np.zeros((PLANES, *bits.shape[1:]), dtype=np.bool_)
         before = [int(str(position)) for position in known.get(name, {}).get("positions", [])]  # type: ignore[attr-defined]
         if before:
             planes[:] = unpack(read_packed(folder / name)[None], packing.order, packing.bits)
         for position in drawn:
             if position in row_of:
-                planes[position % PLANES] = sheets.bits[row_of[position]]
+                planes[position % PLANES] = bits[row_of[position]]
         write_packed(folder / name, pack(planes, packing.order, packing.bits)[0])
         every = sorted({*before, *(p + 1 for p in drawn if p in row_of)})
         return name, {"positions": every, "sha256": file_hash(folder / name)}
 
     images = sorted({position // PLANES for position in part.positions})
-    for _, (name, entry) in shared_out(one, images, workers, check):
+    pictures = [(stream, image) for stream in range(len(stage.rig.streams)) for image in images]
+    for _, (name, entry) in shared_out(one, pictures, workers, check):
         done(name, entry)
 
 

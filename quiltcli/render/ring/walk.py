@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,7 @@ class RingOptions:
         overwrite: replace files that exist.
         workers: processes; 0 takes every core.
         dry_run: find every problem, write nothing.
+        strict: take what is only worth a second look for a problem.
     """
 
     frames: Sequence[int] | None = None
@@ -62,6 +64,7 @@ class RingOptions:
     overwrite: bool = False
     workers: int = 0
     dry_run: bool = False
+    strict: bool = False
 
 
 def render_turns(
@@ -92,7 +95,10 @@ def render_turns(
     folder = options.folder or job.output.directory
     report = read_report(folder, sha)
     parts = [_part(stage, folder, frame, positions, report, sha, options) for frame in frames]
-    for words in notices(stage):
+    worth_a_word = [*stage.scene.notices, *notices(stage)]
+    if options.strict and worth_a_word:
+        raise JobError([*map(Problem, worth_a_word), Problem("--strict does not allow what is said above")])
+    for words in worth_a_word:
         say(f"note: {words}")
     if options.dry_run:
         return []
@@ -125,7 +131,7 @@ def _render(
             start = time.perf_counter()
             show = stage.show(part.frame)
             known: Mapping[str, Any] = report.get(part.frame, {}).get("packed", {})
-            sheets = new_sheets(len(part.positions), stage.rig.size)
+            sheets = new_sheets(stage.rig, len(part.positions))
             tones_in = folder if output.tones else None
             record = draw_tones(stage, show, part, sheets, workers, request.check, tones_in, sha)
             record.packed.update(known)
@@ -155,7 +161,7 @@ def _bits(
     start = time.perf_counter()
     make_bits(stage, part, sheets, workers, check)
     inside = np.maximum(np.count_nonzero(sheets.inside, axis=(1, 2)), 1)
-    record.lit = (np.count_nonzero(sheets.bits, axis=(1, 2)) / inside).tolist()
+    record.lit = (np.count_nonzero(sheets.bits, axis=(2, 3)).mean(axis=0) / inside).tolist()
     record.seconds["halftone"] = time.perf_counter() - start
     start = time.perf_counter()
 
@@ -244,8 +250,9 @@ def _part(
     known = report.get(frame, {}).get("packed", {})
     wanted = set(positions)
     problems, finished = [], set()
-    for image in range(images_of(stage)):
-        path = folder / "packed" / packed_name(number_of(stage, number, image))
+    unfinished: set[int] = set()
+    for stream, image in product(stage.rig.streams, range(images_of(stage))):
+        path = folder / "packed" / packed_name(number_of(stage, number, image), stream)
         inside = [position for position in positions_in(stage, image) if position in wanted]
         if not inside or not output.packed:
             continue
@@ -255,6 +262,7 @@ def _part(
         if isinstance(known, dict) and not sound:
             known.pop(path.name, None)
         finished |= have & set(inside)
+        unfinished |= set(inside) - have
         # A picture that has other positions only is added to.
         if (
             path.exists()
@@ -263,6 +271,7 @@ def _part(
             and (not sound or have & set(inside))
         ):
             problems.append(path)
+    finished -= unfinished
     for position in positions if output.tones else ():
         path = tones_path(folder, number, position)
         if not is_complete(path, sha, frame):

@@ -50,8 +50,13 @@ class Maps:
 
 def maps_of(picture: Float32Array, rotate_deg: float) -> Maps:
     """The maps of a panorama (H, W, 3) that is turned to the left about the vertical."""
+    return turned_maps(picture, rotation_deg((0.0, float(rotate_deg), 0.0)))
+
+
+def turned_maps(picture: Float32Array, turn: FloatArray) -> Maps:
+    """The maps of a panorama (H, W, 3), whose directions a rotation (3, 3) takes to the world's."""
     key = hashlib.sha256(picture.tobytes()).digest()
-    return _made(_Panorama(picture, key), float(rotate_deg))
+    return _made(_Panorama(picture, key), tuple(turn.ravel().tolist()))
 
 
 @dataclass(frozen=True)
@@ -69,8 +74,8 @@ class _Panorama:
 
 
 @lru_cache(maxsize=2)
-def _made(panorama: _Panorama, rotate_deg: float) -> Maps:
-    turn = rotation_deg((0.0, rotate_deg, 0.0))
+def _made(panorama: _Panorama, rows: tuple[float, ...]) -> Maps:
+    turn = np.array(rows).reshape(3, 3)
     picture = panorama.picture
     coarse, fine = (_Light(reduced(picture, width), width, turn) for width in (_COARSE, _FINE))
     mirrors = [_rounded(_sharp(picture, turn))]

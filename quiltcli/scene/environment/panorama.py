@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from quiltcli.errors import Problem, SceneError
-from quiltcli.formats.inputs import read_input
 from quiltcli.formats.mesh.colors import linear_from_srgb
+from quiltcli.formats.packages import read_file
 from quiltcli.formats.picture_bytes import PictureSize, UnreadablePictureError, picture_pixels, picture_size
 from quiltcli.geometry import Float32Array, FloatArray
 
@@ -16,13 +16,13 @@ MOST_PIXELS = 1 << 26
 """Those of 11,585 × 5,792: more than any map made of them shows."""
 
 
-def read_panorama(path: Path) -> Float32Array:
+def read_panorama(path: Path | str) -> Float32Array:
     """Radiance (H, W, 3), linear: of float files as it is, of others from sRGB.
 
     Raises:
         SceneError: the picture cannot be read, is not twice as wide as high, or holds what is no light.
     """
-    data = read_input(path, SceneError)
+    data = read_file(path, SceneError)
     try:
         _check_size(picture_size(data))
         values = picture_pixels(data)

@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from quiltcli.errors import MeshError, Problem, SceneError
+from quiltcli.formats.alembic import SUFFIXES as ALEMBIC_SUFFIXES
 from quiltcli.formats.inputs import foreign_fault, open_input
 from quiltcli.formats.mesh import PolygonMesh
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.formats.mesh.read import READERS, read_polygons
-from quiltcli.scene.importers.gltf import GltfModel, gltf_parts, read_gltf_model
+from quiltcli.formats.usd import SUFFIXES as USD_SUFFIXES
+from quiltcli.scene.importers.alembic import read_alembic_model
+from quiltcli.scene.importers.gltf import read_gltf_model
+from quiltcli.scene.importers.model import Model
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.importers.polygons import parts_of_polygons
+from quiltcli.scene.importers.usd import read_usd_model
 
-SUFFIXES = (".obj", ".ply", ".off", ".stl", ".gltf", ".glb")
+MODELS: Mapping[str, Callable[[Path], Model]] = {
+    ".gltf": read_gltf_model,
+    ".glb": read_gltf_model,
+    **dict.fromkeys(USD_SUFFIXES, read_usd_model),
+    **dict.fromkeys(ALEMBIC_SUFFIXES, read_alembic_model),
+}
+"""Readers of scenes that may move, by suffix."""
+
+SUFFIXES = (".obj", ".ply", ".off", ".stl", *MODELS)
 
 
 @dataclass(frozen=True)
@@ -33,7 +47,7 @@ class Asset:
     missing: tuple[str, ...]
     notices: tuple[str, ...] = ()
     coverage: Coverage = NOTHING
-    model: GltfModel | None = None
+    model: Model | None = None
 
 
 def read_asset(path: Path) -> Asset:
@@ -43,7 +57,7 @@ def read_asset(path: Path) -> Asset:
         SceneError: the file is missing, of an unknown kind, damaged, or holds no triangles.
     """
     _check_file(path)
-    asset = _polygon_asset(path) if path.suffix.lower() in READERS else _gltf_asset(path)
+    asset = _polygon_asset(path) if path.suffix.lower() in READERS else _model_asset(path)
     if not any(len(part.triangles) for part in asset.parts):
         raise SceneError(Problem("holds no triangles", str(path)))
     return asset
@@ -75,16 +89,16 @@ def _place(mesh: PolygonMesh, face: int) -> str:
     return f" (face {face + 1}, line {line})" if line else f" (face {face + 1})"
 
 
-def _gltf_asset(path: Path) -> Asset:
+def _model_asset(path: Path) -> Asset:
     try:
-        model = read_gltf_model(path)
+        model = MODELS[path.suffix.lower()](path)
+        parts = model.parts()
     except MeshError as error:
         raise SceneError(error.problems) from error
-    parts = gltf_parts(model)
     if not any(len(part.triangles) for part in parts):
-        left_out = "".join(f"; {notice}" for notice in model.gltf.notices)
+        left_out = "".join(f"; {notice}" for notice in model.notices)
         raise SceneError(Problem(f"holds no triangles{left_out}", str(path)))
-    return Asset(parts, (), model.gltf.notices, model=model)
+    return Asset(parts, (), model.notices, model=model)
 
 
 def _check_file(path: Path) -> None:

@@ -6,8 +6,8 @@ divided by 683 lm/W, the greatest luminous efficacy there is and the factor that
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from quiltcli.formats.gltf.posing import (
     rest_pose,
 )
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, normalized
+from quiltcli.scene.importers.model import FileLight, Playing, triple
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.materials import Surface, Texture
 from quiltcli.scene.textures.picture import Picture
@@ -69,6 +70,11 @@ class GltfModel:
         """Names of the animations."""
         return tuple(clip.name for clip in self.gltf.clips)
 
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What the file holds that was left out."""
+        return self.gltf.notices
+
     def chosen(self, playing: Playing) -> tuple[Clip, ...]:
         """The animations that are played.
 
@@ -77,53 +83,33 @@ class GltfModel:
         """
         return chosen_clips(str(self.gltf.path), self.gltf.clips, playing.clips)
 
+    def check(self, playing: Playing) -> None:
+        """Raise a `MeshError` unless the file has the animations that are asked for."""
+        self.chosen(playing)
 
-@dataclass(frozen=True)
-class Playing:
-    """Which animations of a file are played, and what comes after their end.
+    def contested(self, playing: Playing) -> int:
+        """Number of channels that are not played, as a clip before theirs moves the same thing."""
+        return contested(self.chosen(playing))
 
-    Attributes:
-        clips: `all`, the name of one or the names of several.
-        after: `hold`, `loop` or `bounce`.
-    """
+    def form(self, seconds: float | None, playing: Playing | None) -> Hashable:
+        """Nothing: triangles are the same at every time."""
+        return None
 
-    clips: str | tuple[str, ...] = "all"
-    after: str = "hold"
+    def hidden(self, seconds: float, playing: Playing) -> bool:
+        """Whatever a scene shows, it shows at every time."""
+        return False
 
+    def parts(self, seconds: float | None = None, playing: Playing | None = None) -> tuple[Part, ...]:
+        """A part for each primitive, all its copies in it, at rest or at a time."""
+        return gltf_parts(self, seconds, playing)
 
-@dataclass(frozen=True)
-class FileLight:
-    """A light of a mesh file, in the file's space.
+    def pose(self, seconds: float, playing: Playing) -> tuple[FloatArray, FloatArray]:
+        """Vertices and normals (V, 3) of all parts after one another, at a time of the animations."""
+        return pose(self, seconds, playing)
 
-    Attributes:
-        kind: `directional`, `point` or `spot`.
-        position: metres; of no account for a directional light.
-        direction: the way it shines, unit; of no account for a point light.
-        color: irradiance of a directional light, radiant intensity of the others.
-        reach: how far it shines, metres; infinite where the file says nothing.
-        cone: angles, radians, from a spot's direction to where it begins to fade and to where it is dark.
-    """
-
-    kind: str
-    position: tuple[float, float, float]
-    direction: tuple[float, float, float]
-    color: tuple[float, float, float]
-    reach: float
-    cone: tuple[float, float]
-
-    def placed(self, matrix: FloatArray) -> FileLight:
-        """The light moved by an affine (4, 4) matrix; its strength, its range and its cone stay."""
-        along = matrix[:3, :3] @ np.array(self.direction)
-        return replace(
-            self,
-            position=_triple(matrix[:3, :3] @ np.array(self.position) + matrix[:3, 3]),
-            direction=_triple(normalized(along)),
-        )
-
-
-def _triple(values: FloatArray) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return x, y, z
+    def lights(self, seconds: float | None = None, playing: Playing | None = None) -> tuple[FileLight, ...]:
+        """The lights of the file at rest, or at a time of its animations."""
+        return gltf_lights(self, seconds, playing)
 
 
 def read_gltf_model(path: Path) -> GltfModel:
@@ -188,11 +174,6 @@ def _pose(model: GltfModel, time: float | None, playing: Playing | None) -> Pose
         return rest_pose(model.gltf)
     playing = playing or Playing()
     return pose_at(model.gltf, model.chosen(playing), time, playing.after)
-
-
-def contested_channels(model: GltfModel, playing: Playing) -> int:
-    """Number of channels that are not played, as a clip before theirs moves the same thing."""
-    return contested(model.chosen(playing))
 
 
 def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
@@ -293,8 +274,8 @@ def _lights(gltf: Gltf, world: FloatArray) -> Iterator[FileLight]:
         red, green, blue = (part * light.intensity / LUMENS_PER_WATT for part in light.color)
         yield FileLight(
             kind=light.kind,
-            position=_triple(place[:3, 3]),
-            direction=_triple(normalized(-place[:3, 2])),
+            position=triple(place[:3, 3]),
+            direction=triple(normalized(-place[:3, 2])),
             color=(red, green, blue),
             reach=light.reach,
             cone=(light.inner, light.outer),

@@ -5,7 +5,7 @@ Kd and Ke of MTL are linear, as numbers in a file are.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,26 +32,59 @@ class PolygonParts(NamedTuple):
     too_small: int
 
 
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """The faces of one material, cut into T triangles over V vertices.
+
+    Attributes:
+        row: of the material, -1 for none.
+        corner: (V,) a corner of the mesh that each vertex is.
+        triangles: (T, 3) indices of vertices.
+    """
+
+    row: int
+    corner: IntArray
+    triangles: IntArray
+
+
+class PolygonCuts(NamedTuple):
+    """A mesh by materials, how well triangles cover its polygons, and the faces that are none."""
+
+    cuts: list[Cut]
+    coverage: Coverage
+    too_small: int
+
+
 def parts_of_polygons(mesh: PolygonMesh) -> PolygonParts:
     """One part for each material of a mesh; faces of less than three corners are left out."""
-    counts = np.diff(mesh.corner_start)
-    triangles, covered = _triangles(mesh, np.flatnonzero(counts >= 3))
+    found = cut_polygons(mesh)
     vertices = mesh.vertices
     if mesh.single:
         with np.errstate(over="ignore"):
             vertices = vertices.astype(np.float32).astype(np.float64)
-    material = np.full(mesh.count, -1, np.int64) if mesh.material is None else mesh.material
     parts = []
+    for cut in found.cuts:
+        made_of = mesh.materials[cut.row] if cut.row >= 0 else None
+        surface = surface_of(made_of, colored=mesh.colors is not None)
+        part = _part(mesh, vertices, cut, surface)
+        parts.append(part if made_of is None else replace(part, material=made_of.name))
+    return PolygonParts(parts, found.coverage, found.too_small)
+
+
+def cut_polygons(mesh: PolygonMesh) -> PolygonCuts:
+    """Triangles of a mesh by materials, corners that share all they have as one vertex."""
+    counts = np.diff(mesh.corner_start)
+    triangles, covered = _triangles(mesh, np.flatnonzero(counts >= 3))
+    material = np.full(mesh.count, -1, np.int64) if mesh.material is None else mesh.material
+    cuts = []
     owner = material[triangles.face]
     rows, first = np.unique(owner, return_index=True)
     # The material that comes last is the first part: triangles keep the numbers they always had.
     for row in rows[np.argsort(-first, kind="stable")]:
         chosen = triangles.corners[_order(owner == row, counts[triangles.face])]
-        made_of = mesh.materials[row] if row >= 0 else None
-        surface = surface_of(made_of, colored=mesh.colors is not None)
-        part = _part(mesh, vertices, chosen, surface)
-        parts.append(part if made_of is None else replace(part, material=made_of.name))
-    return PolygonParts(parts, covered, int(np.count_nonzero(counts < 3)))
+        corner, index = _shared(mesh, chosen.ravel())
+        cuts.append(Cut(int(row), corner, index.reshape(-1, 3)))
+    return PolygonCuts(cuts, covered, int(np.count_nonzero(counts < 3)))
 
 
 def _triangles(mesh: PolygonMesh, faces: IntArray) -> tuple[Triangles, Coverage]:
@@ -80,16 +113,14 @@ def _order(chosen: BoolArray, counts: IntArray) -> IntArray:
     return found
 
 
-def _part(mesh: PolygonMesh, vertices: FloatArray, triangles: IntArray, surface: Surface) -> Part:
-    """Triangles (T, 3) of corners as a part, corners that share all they have as one vertex."""
-    used = triangles.ravel()
-    corner, index = _shared(mesh, used)
+def _part(mesh: PolygonMesh, vertices: FloatArray, cut: Cut, surface: Surface) -> Part:
+    corner = cut.corner
     normals = None if mesh.normals is None else mesh.normals[corner]
     if normals is not None and np.isnan(normals).all():
         normals = None
     return Part(
         vertices=vertices[mesh.corners[corner]],
-        triangles=index.reshape(-1, 3),
+        triangles=cut.triangles,
         normals=normals,
         colors=None if mesh.colors is None else mesh.colors[corner],
         surface=surface,

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TypeVar
 
 from numpy.typing import NDArray
 
 from quiltcli.errors import MeshError, Problem, SceneError
 from quiltcli.formats.gltf.images import Images
-from quiltcli.formats.inputs import read_input
+from quiltcli.formats.packages import read_file
 from quiltcli.formats.picture_bytes import PictureSize, UnreadablePictureError, picture_pixels, picture_size
 
 T = TypeVar("T")
@@ -22,7 +21,7 @@ class Picture:
     """A picture, read when it is asked for.
 
     Attributes:
-        path: its file, or the file it is part of.
+        path: its file, inside of a package if it is in one, or the glTF file it is part of.
         images: the images of that glTF file; None for a file of its own.
         index: of the image in these.
     """
@@ -59,7 +58,7 @@ class Picture:
             except MeshError as error:
                 raise SceneError(error.problems) from None
         try:
-            return from_bytes(read_input(Path(self.path), SceneError, "a picture"))
+            return from_bytes(read_file(self.path, SceneError, "a picture"))
         except UnreadablePictureError as error:
             raise SceneError(Problem(f"{use}: cannot be read: {error}", self.path)) from None
         except SceneError as error:

@@ -61,6 +61,7 @@ class Sheet:
     wrap: tuple[str, str]
     nearest: bool = False
     heights: bool = False
+    opaque: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,9 +169,9 @@ class TextureStore:
 
 def sheet_of(texture: Texture) -> Sheet:
     """The texels that a texture is looked up in."""
-    return Sheet(
-        texture.picture, texture.role in IN_SRGB, texture.wrap, texture.nearest, texture.role == "bump"
-    )
+    srgb = texture.role in IN_SRGB and not texture.raw
+    heights = texture.role == "bump"
+    return Sheet(texture.picture, srgb, texture.wrap, texture.nearest, heights, texture.opaque)
 
 
 def check_textures(textures: Iterable[Texture], limits: TextureLimits | None = None) -> None:
@@ -264,6 +265,8 @@ def _write(
 ) -> None:
     """Write a picture's levels of some sizes into the pool, each with its border."""
     pixels = sheet.picture.pixels(texture.use)
+    if sheet.opaque and pixels.shape[2] in (2, 4):
+        pixels = pixels[..., :-1]
     if sheet.heights:
         pixels = normals_of(pixels, sheet.wrap)
     srgb = sheet.srgb and pixels.dtype.kind == "u"

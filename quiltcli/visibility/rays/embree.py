@@ -51,6 +51,7 @@ def aim(
     *,
     one_sided: BoolArray | None = None,
     invisible: BoolArray | None = None,
+    beside: float = 0.0,
 ) -> Target:
     """Make a target of a scene.
 
@@ -61,6 +62,7 @@ def aim(
         backface_culling: leave out triangles whose winding is clockwise as seen from the eye.
         one_sided: (T,) the only ones that are left out then, without `backface_culling`; None for none.
         invisible: (T,) triangles that hold up no light; None for none.
+        beside: how far from the eye rays may begin, metres.
 
     Raises:
         MissingExtraError: there is no Embree on this machine.
@@ -78,7 +80,7 @@ def aim(
         drawn &= ~invisible
     farthest = viewer.reach_of(corners.T)[triangles].max(axis=1)
     # What ends before near begins would only have to be stepped through.
-    named = np.flatnonzero(drawn & (farthest >= viewer.near * (1 - 1e-6)))
+    named = np.flatnonzero(drawn & (farthest >= viewer.near * (1 - 1e-6) - beside))
     plane = np.concatenate((normal, offset[:, None]), axis=1)
     demand_embree()
     embree = embree_scene(corners, triangles[named])
@@ -153,23 +155,36 @@ def reach_along(viewer: Viewer, directions: FloatArray) -> FloatArray:
     return viewer.reach_of(np.moveaxis(directions, -1, 0))
 
 
-def plane_distance(target: Target, triangle: IntArray, directions: FloatArray) -> FloatArray:
-    """Multiples t (N,) at which rays t·d (N, 3) meet triangles' planes; infinite where they run along."""
+def plane_distance(
+    target: Target, triangle: IntArray, directions: FloatArray, origin: FloatArray | None = None
+) -> FloatArray:
+    """Multiples t (N,) at which rays o + t·d (N, 3) meet triangles' planes; infinite where they run along.
+
+    `origin` o is minus the eye; None for the eye itself.
+    """
     plane = target.plane[triangle]
     slope = dot(plane[:, :3], directions)
-    result: FloatArray = np.divide(plane[:, 3], slope, out=np.full(slope.shape, np.inf), where=slope != 0)
+    offset = plane[:, 3] if origin is None else plane[:, 3] - dot(plane[:, :3], origin)
+    result: FloatArray = np.divide(offset, slope, out=np.full(slope.shape, np.inf), where=slope != 0)
     return result
 
 
-def plane_depth(target: Target, triangle: IntArray, directions: FloatArray) -> FloatArray:
-    """Depth (N,) of the planes of triangles (N,) along rays (N, 3) from the eye, metres."""
+def plane_depth(
+    target: Target, triangle: IntArray, directions: FloatArray, origin: FloatArray | None = None
+) -> FloatArray:
+    """Depth (N,) of the planes of triangles (N,) along rays (N, 3) from the eye, or from origins, metres."""
     with np.errstate(invalid="ignore"):  # infinity times 0
         return np.asarray(
-            plane_distance(target, triangle, directions) * measure_along(target.viewer, directions)
+            plane_distance(target, triangle, directions, origin) * measure_along(target.viewer, directions)
         )
 
 
-def cast(target: Target, directions: FloatArray, beyond: FloatArray | None = None) -> IntArray:
+def cast(
+    target: Target,
+    directions: FloatArray,
+    beyond: FloatArray | None = None,
+    origin: FloatArray | None = None,
+) -> IntArray:
     """The first triangle that is drawn along each ray.
 
     Surfaces nearer than near are passed; nothing is seen beyond far.
@@ -178,6 +193,7 @@ def cast(target: Target, directions: FloatArray, beyond: FloatArray | None = Non
         target: the scene.
         directions: (N, 3) unit directions from the eye.
         beyond: (N,) distances from the eye at which rays start, metres; the eye itself when None.
+        origin: (N, 3) eyes of their own, minus the target's, metres; None where all have that.
 
     Returns:
         (N,) triangles; MISS, or UNSURE where a surface lies on the near or far limit itself.
@@ -193,11 +209,12 @@ def cast(target: Target, directions: FloatArray, beyond: FloatArray | None = Non
         if not live.size:
             return found
         ray = directions[live]
-        origin = (start[live, None] * ray).astype(np.float32)
-        met = target.embree.run(origin, ray.astype(np.float32)).astype(np.int64)
+        own = None if origin is None else origin[live]
+        begin = start[live, None] * ray if own is None else own + start[live, None] * ray
+        met = target.embree.run(begin.astype(np.float32), ray.astype(np.float32)).astype(np.int64)
         live, ray, met = live[met >= 0], ray[met >= 0], met[met >= 0]
         triangle = target.named[met]
-        distance = plane_distance(target, triangle, ray)
+        distance = plane_distance(target, triangle, ray, None if origin is None else origin[live])
         verdict = _in_range(target.viewer, distance * gain[live])
         found[live] = np.where(verdict == 0, triangle, np.where(verdict == UNSURE, UNSURE, MISS))
         passed = verdict < UNSURE

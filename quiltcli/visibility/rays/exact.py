@@ -74,6 +74,9 @@ def intersect(
 ) -> Tests:
     """Test triangles (M,) against rays of the pixels in `row` (M,), `beside` their centres in pixels."""
     a, b, c = (target.corners[target.triangles[triangle, k]] for k in range(3))
+    begin = pixels.from_eye(row)
+    if begin is not None:
+        a, b, c = a - begin, b - begin, c - begin
     e1, e2 = b - a, c - a
     # Numerators over the determinant give the weights u and v and the distance t.
     across = cross(e2, e1)

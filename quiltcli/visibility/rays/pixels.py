@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Places:
         x: (P,) column.
         y: (P,) row.
         ray: (P, 3, 3) page pixel (x, y, 1) → direction from the eye; on a curved facet each pixel's own.
+        origin: (P, 3) where rays begin, minus the eye, metres; None where all begin there.
     """
 
     address: IntArray
@@ -38,6 +39,24 @@ class Places:
     x: IntArray
     y: IntArray
     ray: FloatArray
+    origin: FloatArray | None = None
+
+    def from_eye(self, row: IntArray) -> FloatArray | None:
+        """Where rays of some pixels begin (N, 3), minus the eye; None where all begin there."""
+        return None if self.origin is None else self.origin[row]
+
+    def take(self, rows: IntArray) -> Places:
+        """Some of the pixels."""
+        return Places(
+            address=self.address[rows],
+            facet=self.facet[rows],
+            bleed=self.bleed[rows],
+            page=self.page[rows],
+            x=self.x[rows],
+            y=self.y[rows],
+            ray=self.ray[rows],
+            origin=self.from_eye(rows),
+        )
 
     def directions(self, dx: float = 0.0, dy: float = 0.0) -> FloatArray:
         """Unit directions (P, 3) through the pixels, `dx`, `dy` pixels beside their centres."""
@@ -49,10 +68,6 @@ class Places:
         ray = self.ray
         return np.asarray(ray[:, :, 0] * x[:, None] + ray[:, :, 1] * y[:, None] + ray[:, :, 2])
 
-    def take(self, rows: IntArray) -> Places:
-        """Some of the pixels."""
-        return Places(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
-
 
 def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> Places:
     """The pixels at flat quilt addresses (P,), each of which a facet or its bleed owns."""
@@ -63,12 +78,17 @@ def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRay
     local = address - layout.page_offset[page]
     x, y = local % width, local // width
     ray = rays.eye_from_quilt[facet]
+    origin: FloatArray | None = None
     for row, view in enumerate(rays.views):
         if view is not None:
             mine = np.flatnonzero(facet == row)
             if mine.size:
                 ray[mine] = view.matrices(x[mine] + 0.5, y[mine] + 0.5)
-    return Places(address, facet, owner < 0, page, x, y, ray)
+                begin = view.origins(x[mine] + 0.5, y[mine] + 0.5)
+                if begin is not None:
+                    origin = np.zeros((address.size, 3)) if origin is None else origin
+                    origin[mine] = begin.T
+    return Places(address, facet, owner < 0, page, x, y, ray, origin)
 
 
 def lit_pixels(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> BoolArray:

@@ -29,7 +29,8 @@ def weight_slopes(
         triangle: (P,) which triangles.
         matrix: (P, 3, 3) page pixel (x, y, 1) → direction from the eye.
         ray: (P, 3) directions.
-        position: (P, 3) points minus the eye.
+        position: (P, 3) points minus where their rays begin. That neighbours may begin beside one another
+            is left out: it is little, and textures alone are filtered by it.
     """
     normal = target.plane[triangle, :3]
     along = dot(normal, ray)

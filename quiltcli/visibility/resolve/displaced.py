@@ -38,16 +38,19 @@ class DisplacedTiles(MixedTiles):
 
 def rays_of(reader: Reader, samples: Samples, tiles: Tiles, pixel: IntArray) -> Rays:
     """Rays of pixels (G,) of microtiles of patches, counted through all of these."""
-    x, y = (samples.place[k].take(tiles.index, axis=0).reshape(-1).take(pixel) for k in (0, 1))
-    block = tiles.block.take(pixel >> 6)
     limits = reader.limits
-    vectors = np.stack(limits.directions(block.astype(np.int32), x, y))
+    # All pixels of microtiles, for a matrix each is less to move than one a pixel.
+    x, y = (samples.place[k].take(tiles.index, axis=0) for k in (0, 1))
+    directions = limits.directions(tiles.block.astype(np.int32)[:, None], x, y)
+    vectors = np.empty((3, pixel.size))
+    for k in range(3):
+        directions[k].reshape(-1).take(pixel, out=vectors[k])
     if limits.radial:
         depth = np.sqrt(vectors[0] * vectors[0] + vectors[1] * vectors[1] + vectors[2] * vectors[2])
     else:
         look = limits.look
         depth = look[0] * vectors[0] + look[1] * vectors[1] + look[2] * vectors[2]
-    return Rays(x, y, vectors, depth)
+    return Rays(x.reshape(-1).take(pixel), y.reshape(-1).take(pixel), vectors, depth)
 
 
 def read_displaced(reader: Reader, samples: Samples) -> Iterator[DisplacedTiles]:

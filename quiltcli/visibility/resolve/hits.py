@@ -188,6 +188,7 @@ def point_hits(
     normals: Float32Array,
     inside: int,
     slopes: FloatArray | None = None,
+    ray: FloatArray | None = None,
 ) -> Hits:
     """Hits of P single pixels, from points that are known.
 
@@ -201,16 +202,18 @@ def point_hits(
         normals: (T, 12) the scene's `corner_normals`.
         inside: pixels that are not bleed.
         slopes: (2, 2, P) how the weights change from pixel to pixel [weight, axis], where that is wanted.
+        ray: (3, P) rays that end in the points, of any length; None where they come from the eye.
     """
+    ray = position if ray is None else ray
     rows = normals.take(triangle, axis=0).T
-    towards = np.sign(-(rows[9:12] * position).sum(axis=0))
+    towards = np.sign(-(rows[9:12] * ray).sum(axis=0))
     normal = (rows[0:3] + weights[0] * rows[3:6] + weights[1] * rows[6:9]) * towards
     return Hits(
         places=single_places(first),
         chosen=None,
         facet=facet,
         triangle=triangle,
-        ray=PointVectors(position.astype(np.float32)[:, :, None]),
+        ray=PointVectors(ray.astype(np.float32)[:, :, None]),
         depth=depth[:, None],
         normal=PointVectors(normal.astype(np.float32)[:, :, None]),
         weights=weights.astype(np.float32)[:, :, None],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from quiltcli.formats.exr.image import read_exr, write_exr
 from quiltcli.job import load_job
 from quiltcli.render.ring.walk import RingOptions, render_turns
 from tests.helpers.ring_job import ring_job
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -38,6 +41,13 @@ def test_a_turn_passes(tmp_path: Path, method: str, reflection: str) -> None:
     assert (verdict.bits, verdict.tones, verdict.source) == (24, 24, "packed pictures")
     assert verdict.rays > 24 * 500
     assert verdict.trip_error < 1e-9
+
+
+def test_the_display_that_comes_with_quilt_passes() -> None:
+    verdict = verify_turn(load_job(ROOT / "scenes" / "demo_mirror.yaml"), RingVerifyOptions(redraw=True))
+    assert verdict.passed
+    assert (verdict.positions, verdict.rays) == (12, 12 * math.ceil(20_000 / 12))
+    assert verdict.edges > 0
 
 
 def test_straight_edges_are_found_wrong(tmp_path: Path) -> None:

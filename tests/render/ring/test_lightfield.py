@@ -11,6 +11,8 @@ from click.testing import CliRunner
 from quiltcli.analysis.ring.simulate import EyeOptions, look_at_display
 from quiltcli.cli.group import main
 from quiltcli.errors import JobError
+from quiltcli.formats.bitplanes import read_packed, unpack
+from quiltcli.halftone.light import luminance
 from quiltcli.job import load_job
 from quiltcli.render.ring.setup import set_ring_stage
 from quiltcli.render.ring.walk import RingOptions, render_turns
@@ -78,3 +80,21 @@ def test_an_eye_sees_the_photographs_and_they_are_what_it_is_held_against(jobs: 
     assert -10 * np.log10(np.mean((found.direct - scene.direct) ** 2)) > 24
     assert found.comparison is not None
     assert found.comparison.psnr > 24
+
+
+def test_photographs_may_be_bits_before_they_are_rearranged(jobs: tuple[Path, Path], tmp_path: Path) -> None:
+    job = load_job(jobs[1], ["halftone={before: true}", f"output.directory={tmp_path}"])
+    stage, late = set_ring_stage(job), set_ring_stage(load_job(jobs[1]))
+    angle = stage.rig.angle(5)
+    copied, blended = (draw_picture(one.show(1), angle) for one in (stage, late))
+    assert set(np.unique(copied.rgb()).tolist()) == {0.0, 1.0}
+    mean = luminance(blended.rgb())[blended.lit].mean()
+    assert copied.rgb()[copied.lit][:, 0].mean() == pytest.approx(float(mean), abs=0.02)
+    render_turns(job, RingOptions(workers=1))
+    bits = unpack(read_packed(tmp_path / "packed" / "dvi.00000001.png")[None])[5]
+    assert np.array_equal(bits, (copied.rgb()[..., 0] > 0.5) & copied.lit)
+
+
+def test_only_photographs_are_bits_before(jobs: tuple[Path, Path]) -> None:
+    with pytest.raises(JobError, match=r"halftone\.before: is for photographs"):
+        load_job(jobs[0], ["halftone={before: true}"])

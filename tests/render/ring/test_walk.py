@@ -69,8 +69,8 @@ def test_bits_are_the_halftone_of_tones(whole: Path) -> None:
     stage = set_ring_stage(load_job(whole.parent / "job.yaml"))
     show = stage.show(3)
     tones = tones_of(stage.rig, [draw_picture(show, stage.rig.angle(24))], stage.halftone)
-    assert np.array_equal(bits[0], turn.halftone(tones.values[None], tones.inside, stage.halftone)[0])
-    mean = float(tones.values[tones.inside].mean(dtype=float))
+    assert np.array_equal(bits[0], turn.halftone(tones.values, tones.inside, stage.halftone)[0])
+    mean = float(tones.values[0][tones.inside].mean(dtype=float))
     assert bits[0][tones.inside].mean() == pytest.approx(mean, abs=0.02)
     assert not bits[0][~tones.inside].any()
 
@@ -173,8 +173,8 @@ def test_dwelling_is_made_up_for(tmp_path: Path) -> None:
         set_ring_stage(load_job(job, [f"halftone={{compensate: {how}}}"])) for how in ("none", "dwell")
     )
     picture = draw_picture(plain.show(1), plain.rig.angle(5))
-    before = tones_of(plain.rig, [picture], plain.halftone).values
-    after = tones_of(even.rig, [picture], even.halftone, even.shortest).values
+    before = tones_of(plain.rig, [picture], plain.halftone).values[0]
+    after = tones_of(even.rig, [picture], even.halftone, even.shortest).values[0]
     lit = before > 0.05
     share = after[lit].astype(float) / before[lit]
     assert 0.8 < share.min() < share.max() <= 1.001
@@ -206,6 +206,16 @@ def test_frames_and_positions_that_do_not_exist_are_told(whole: Path, tmp_path: 
 def test_impossible_viewers_are_told(whole: Path, tmp_path: Path, sets: str, words: str) -> None:
     with pytest.raises((SceneError, ViewerError), match=words):
         render_turns(load_job(whole.parent / "job.yaml", [sets]), RingOptions([3], tmp_path))
+    assert not any(tmp_path.iterdir())
+
+
+def test_what_is_worth_a_word_is_refused_where_that_is_wanted(whole: Path, tmp_path: Path) -> None:
+    job, told = load_job(whole.parent / "job.yaml"), []
+    render_turns(job, RingOptions([3], tmp_path / "out", dry_run=True), told.append)
+    assert [words for words in told if "gap" in words]
+    with pytest.raises(JobError, match="--strict does not allow what is said above") as error:
+        render_turns(job, RingOptions([3], tmp_path / "out", strict=True))
+    assert [f"note: {problem.message}" for problem in error.value.problems[:-1]] == told
     assert not any(tmp_path.iterdir())
 
 

@@ -20,10 +20,10 @@ varying vec3 world;
 varying float shows;
 void main() {
   place = evenPlace = quilt;
-  normalOut = facing;
-  world = position;
+  normalOut = mat3(modelMatrix) * facing;
+  world = (modelMatrix * vec4(position, 1.0)).xyz;
   shows = lit;
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  gl_Position = projectionMatrix * viewMatrix * vec4(world, 1.0);
 }`;
 
 // Four looks a pixel, spread over it: images are mostly finer than the screen. None of them leaves the
@@ -35,6 +35,8 @@ uniform vec2 span;
 uniform float both;
 uniform float hot;
 uniform float backs;
+uniform float bent;
+uniform vec3 shownTo;
 uniform mat4 heatFrom;
 uniform vec3 edgeOn;
 uniform vec3 faceOn;
@@ -50,10 +52,13 @@ void main() {
   float fits = min(1.0, 1.5 / (length(dx) + length(dy) + 1e-9));
   dx *= fits;
   dy *= fits;
-  float turned = dot(normalOut, normalize(world - cameraPosition));
+  vec3 outward = bent > 0.5 ? normalize(normalOut) : normalOut;
+  float turned = dot(outward, normalize(world - cameraPosition));
+  // A curved facet is dark where its own lit side faces away from the eye, place by place.
+  bool on = shows > 0.5 && (bent < 0.5 || both > 0.5 || dot(outward, shownTo - world) > 0.0);
   if (backs < 0.5 && both < 0.5 && turned > 0.0) discard;
   vec3 color = mix(edgeOn, faceOn, abs(turned));
-  if (shows > 0.5 && (both > 0.5 || turned < 0.0)) {
+  if (on && (both > 0.5 || turned < 0.0)) {
     color = 0.25 * (look(place + dx + dy) + look(place + dx - dy) + look(place - dx + dy) + look(place - dx - dy));
     if (hot > 0.5) {
       vec4 seen = heatFrom * vec4(world, 1.0);
@@ -85,11 +90,15 @@ class Display {
     this.corners = this.position.length / 3;
     this.cornerFacet = new Uint32Array(this.corners);
     for (let f = 0; f < this.count; f += 1) this.cornerFacet.fill(f, this.start[f], this.start[f + 1]);
+    this.bent = mesh.bent ? unpack(mesh.bent, Uint8Array) : new Uint8Array(this.count);
+    this.curved = this.bent.some((bent) => bent);
     this.lit = new Uint8Array(this.count);
+    this.carried = new THREE.Matrix4();  // a projection goes along with the eye
     this.shared = this.attributes(unpack(mesh.quilt, Float32Array));
     const [, edgeOn, faceOn] = data.greys.map(linear);
     this.uniforms = {
       both: { value: mesh.both ? 1 : 0 }, hot: { value: 0 }, backs: { value: 1 }, heat: { value: null },
+      bent: { value: this.curved ? 1 : 0 }, shownTo: { value: new THREE.Vector3() },
       heatFrom: { value: new THREE.Matrix4() }, edgeOn: { value: edgeOn }, faceOn: { value: faceOn },
     };
     this.meshes = this.makeMeshes(unpack(mesh.triangles, Uint32Array), unpack(mesh.facet, Uint32Array));
@@ -98,8 +107,9 @@ class Display {
   }
 
   attributes(quilt) {
-    const facing = new Float32Array(this.corners * 3);
-    for (let c = 0; c < this.corners; c += 1) {
+    const given = this.data.mesh.facing;
+    const facing = given ? unpack(given, Float32Array) : new Float32Array(this.corners * 3);
+    for (let c = 0; !given && c < this.corners; c += 1) {
       const f = this.cornerFacet[c];
       facing.set(this.normal.subarray(3 * f, 3 * f + 3), 3 * c);
     }
@@ -137,8 +147,8 @@ class Display {
   }
 
   makeEdges() {
-    const pairs = [];
-    for (let f = 0; f < this.count; f += 1) {
+    const pairs = this.curved ? [...unpack(this.data.mesh.edges, Uint32Array)] : [];
+    for (let f = 0; !this.curved && f < this.count; f += 1) {
       const [from, to] = [this.start[f], this.start[f + 1]];
       for (let c = from; c < to; c += 1) pairs.push(c, c + 1 < to ? c + 1 : from);
     }
@@ -164,6 +174,13 @@ class Display {
   /** Show a frame's images; `textures` are those of its pages. */
   show(frame, textures) {
     this.lit = unpack(frame.lit, Uint8Array);
+    this.uniforms.shownTo.value.fromArray(frame.eye);
+    this.carried.fromArray(frame.carried || new THREE.Matrix4().elements);
+    for (const part of [...this.meshes, this.edges]) {
+      part.matrixAutoUpdate = false;
+      part.matrix.copy(this.carried);
+      part.matrixWorldNeedsUpdate = true;
+    }
     const lit = this.shared.lit;
     for (let c = 0; c < this.corners; c += 1) lit.array[c] = this.lit[this.cornerFacet[c]];
     lit.needsUpdate = true;
@@ -187,6 +204,7 @@ class Display {
   /** Whether a facet is drawn as seen from a place. */
   drawnFrom(f, place) {
     const { middle, normal } = this.middles[f];
+    if (this.bent[f]) return true;
     return this.uniforms.backs.value > 0 || this.data.mesh.both || place.clone().sub(middle).dot(normal) > 0;
   }
 
@@ -197,7 +215,9 @@ class Display {
   }
 
   points() {
-    return Array.from({ length: this.corners }, (_, c) => new THREE.Vector3().fromArray(this.position, 3 * c));
+    return Array.from({ length: this.corners }, (_, c) => (
+      new THREE.Vector3().fromArray(this.position, 3 * c).applyMatrix4(this.carried)
+    ));
   }
 
   describe(f) {
