@@ -29,6 +29,25 @@ def summed(channels: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in channels if CHANNELS[name].averaged or CHANNELS[name].matte)
 
 
+def write_alike(shaded: Shaded, channels: tuple[str, ...], buffers: Buffers, count: int) -> None:
+    """Write what all of `count` samples of some pixels see alike: to the last bit the mean of their sum."""
+    hits, whole = shaded.hits, np.float32(count)
+    one = np.ones((1, 1), dtype=np.float16)
+    for name in channels:
+        if CHANNELS[name].matte:
+            identity = identities_of(shaded.scene, name, hits.triangle).view(np.float32)
+            first, share, *rest = CHANNELS[name].layers
+            hits.put(buffers[first], identity[:, None])
+            for layer, value in ((share, 1), *((layer, 0) for layer in rest)):
+                hits.put(buffers[layer], np.full((1, 1), value, dtype=np.float32))
+            continue
+        for layer, values in zip(CHANNELS[name].layers, light_at_points(name, shaded), strict=False):
+            mean = np.minimum(values, MOST_HALF) * whole / whole
+            hits.put(buffers[layer], np.minimum(mean, MOST_HALF).astype(np.float16))
+        if name == "rgba":
+            hits.put(buffers["A"], one)
+
+
 def new_sums(channels: tuple[str, ...], zeros: Callable[[Any], NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Memory for `Sums` of channels, by name; `zeros` makes a flat array of a type."""
     wanted: dict[str, Any] = {"cover": np.float32}
