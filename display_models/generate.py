@@ -130,6 +130,16 @@ CURVED = {
         "  - [[-1.5, 1.4, 0.2], [-0.6, 1.3, -0.9], [0.6, 1.5, 0.9], [1.5, 1.4, 0.1]]\n"
         "  - [[-1.5, 0.6, 0.5], [-0.6, 0.4, -0.6], [0.6, 0.8, 0.6], [1.5, 0.6, -0.2]]\n",
     ),
+    "projected_sphere": (
+        "a sphere of 1 m radius on the ground, lit by four projectors around it that overlap",
+        "screen: sphere.yaml\nprojectors:\n"
+        + "".join(
+            f"- name: {name}\n  pixels: [1024, 768]\n"
+            f"  lens: {{at: [{x}, 2, {z}], look_at: [0, 1, 0], throw: 1.1}}\n"
+            for name, x, z in (("front", 0, 3.2), ("right", 3.2, 0), ("back", 0, -3.2), ("left", -3.2, 0))
+        )
+        + "blend: {black: 0.001}\n",
+    ),
     "panorama160": (
         "a panorama of 160 flat strips around the eye (Lorenz and Döllner); without pieces it is round",
         "projection: {kind: cylinder, pieces: 160, pixels: [1600, 1200]}\n",

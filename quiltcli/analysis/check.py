@@ -44,7 +44,9 @@ from quiltcli.job.model import attach
 from quiltcli.layout import Layout, align, read_layout
 from quiltcli.layout.from_job import layout_for
 from quiltcli.lightfield import load_field
-from quiltcli.render.needs import demand_memory, method_problems
+from quiltcli.render.crew import default_threads
+from quiltcli.render.memory import estimate_text
+from quiltcli.render.needs import demand_memory, method_problems, view_count
 from quiltcli.render.notices import job_warnings
 from quiltcli.render.ring.setup import notices as ring_notices
 from quiltcli.render.ring.setup import set_ring_stage
@@ -64,7 +66,10 @@ _MOST_FRAMES = 1000  # looked at for facets that are always dark
 
 
 def check_files(
-    paths: Iterable[Path], say: Callable[[str], None] = lambda notice: None, target: str = ""
+    paths: Iterable[Path],
+    say: Callable[[str], None] = lambda notice: None,
+    target: str = "",
+    plan: Callable[[str], None] = lambda words: None,
 ) -> list[Problem]:
     """Every problem of jobs, displays, layouts, scenes and meshes, each once, file by file.
 
@@ -72,12 +77,15 @@ def check_files(
         paths: the files.
         say: told once each what is no problem but good to know: what of a scene is not drawn.
         target: who will play a job's images, a name of `delivery.TARGETS`; empty for nobody known.
+        plan: told what each job would take of the machine.
     """
     findings = _Findings(target)
     for path in paths:
         findings.check(Path(path))
     for notice in dict.fromkeys(findings.notices):
         say(notice)
+    for words in dict.fromkeys(findings.plans):
+        plan(words)
     return list(dict.fromkeys(findings.problems))
 
 
@@ -88,6 +96,7 @@ class _Findings:
         self.target = target
         self.problems: list[Problem] = []
         self.notices: list[str] = []
+        self.plans: list[str] = []
         self.displays: dict[Path, Facets | None] = {}
         self.seen: set[Path] = set()
 
@@ -216,6 +225,9 @@ def _check_job(findings: _Findings, path: Path) -> None:
         findings.problems += facet_problems(job, facets.count) + method_problems(job, facets)
     before = len(findings.problems)
     scene, source = findings.scene(job.scene, findings.run(load_scene_file, job.scene), job)
+    if placed is not None and scene is not None:
+        words = estimate_text(job, placed, view_count(job), len(scene.triangles), default_threads())
+        findings.plans.append(f"{path}: {words}")
     if facets is None or found:
         return
     findings.notices += stereo_notices(job, facets, scene)

@@ -28,6 +28,7 @@ class Chart:
         wraps: whether the left and the right edge are the same line of the world.
         cuts: columns, and rows, at which the shape is broken.
         omni: eyes beside the head, for a projection in which each direction has its own; None for one eye.
+        adds: whether its light adds to what other facets show at the same place, as a projector's does.
         record: the surface or the projection in words, JSON, for images and hashes.
     """
 
@@ -39,6 +40,7 @@ class Chart:
     wraps: bool = False
     cuts: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
     omni: Omnistereo | None = None
+    adds: bool = False
     record: str = ""
 
     @property

@@ -14,6 +14,9 @@ CELLS = 128
 _STEPS = 5
 _FARTHEST = 0.05  # of the raster, that a step may go
 _CLOSE = 1e-7  # of a ray's length, that a point may be off it
+_VERY_CLOSE = 1e-11  # likewise, after steps with slopes of another place
+_CHORDS = 4
+_AT_A_TIME = 1 << 15  # rays, so that what is worked out of them stays near
 
 
 def net(chart: Chart, cells: int = CELLS) -> tuple[FloatArray, FloatArray, Int32Array]:
@@ -67,6 +70,42 @@ def meet(chart: Chart, origin: FloatArray, rays: FloatArray, guess: FloatArray) 
     with np.errstate(invalid="ignore"):
         good = (away <= _CLOSE * np.sqrt((off**2).sum(axis=0))) & (share > 0)
     return np.where(good, place, guess)
+
+
+def meet_near(chart: Chart, origin: FloatArray, rays: FloatArray, guess: FloatArray) -> FloatArray:
+    """As `meet`, for guesses from a net: slopes are taken once, and where that is not enough once more.
+
+    A net is off by its sagitta, some ten-thousandth of its size; with the slopes of the guess each step
+    leaves as small a share of the error (the simplified method of Newton), at a quarter of the price.
+    """
+    place = guess.copy()
+    for first in range(0, place.shape[1], _AT_A_TIME):
+        some = np.s_[:, first : first + _AT_A_TIME]
+        place[some] = _nearer(chart, origin, rays[some], guess[some])
+    off = chart.points(*place) - origin[:, None]
+    share = (off * rays).sum(axis=0) / (rays * rays).sum(axis=0)
+    away = ((off - share * rays) ** 2).sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        far = np.flatnonzero(~((away <= (_VERY_CLOSE**2) * (off * off).sum(axis=0)) & (share > 0)))
+    place[:, far] = meet(chart, origin, rays[:, far], guess[:, far])
+    return place
+
+
+def _nearer(chart: Chart, origin: FloatArray, rays: FloatArray, guess: FloatArray) -> FloatArray:
+    """Guesses (2, P) after some steps with the slopes that they have."""
+    off, along, down = _linear(chart, origin, guess)
+    with np.errstate(all="ignore"):
+        det = (crossed(along, down) * rays).sum(axis=0)
+        # dx = −(off × down)·d / det, dy = −(along × off)·d / det, as products with `off`.
+        to_x, to_y = -crossed(down, rays) / det, -crossed(rays, along) / det
+    limit = np.array(chart.size)[:, None] * _FARTHEST
+    place = guess.copy()
+    for step in range(_CHORDS):
+        if step:
+            off = chart.points(*place) - origin[:, None]
+        moved = np.stack(((to_x * off).sum(axis=0), (to_y * off).sum(axis=0)))
+        place += np.clip(np.nan_to_num(moved, nan=0.0, posinf=0.0, neginf=0.0), -limit, limit)
+    return place
 
 
 def _linear(chart: Chart, origin: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -101,9 +102,16 @@ class Placed:
         known = self.shape.known
         return known[:, ::-1] if known is not None and self.reversed else known
 
+    @cached_property
+    def _upright(self) -> bool:
+        """Whether it is not turned, only moved."""
+        return bool((self.linear == np.eye(3)).all())
+
     def at(self, s: FloatArray, t: FloatArray) -> FloatArray:
         """See `Shape.at`."""
         local = self.shape.at(1.0 - s if self.reversed else s, t)
+        if self._upright:
+            return np.asarray(local + self.shift.reshape(3, *[1] * (local.ndim - 1)))
         return turned(self.linear, local, self.shift)
 
     def normal(self, s: FloatArray, t: FloatArray) -> FloatArray:

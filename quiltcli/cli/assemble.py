@@ -20,6 +20,11 @@ from quiltcli.cli.options import COLORSPACE, OVERWRITE, PATH, SETS, THREADS, fra
     help="Names of the pictures: {name} or {facet:04}, {frame:04} or ####, {.eye} or {eye}.",
 )
 @click.option("--cameras", type=PATH, help="The cameras they were made through; older pictures are refused.")
+@click.option(
+    "--depth",
+    type=click.Choice(("axis", "distance", "job")),
+    help="What their depth measures: along the camera's axis (else), along the ray, or what the job's does.",
+)
 @click.option("--allow-missing", is_flag=True, help="Leave facets dark whose pictures are missing.")
 @frames_option("Frames; the job's by default.")
 @COLORSPACE
@@ -32,6 +37,7 @@ def assemble(
     output: Path,
     pattern: str,
     cameras: Path | None,
+    depth: str | None,
     allow_missing: bool,
     frames: tuple[int, ...] | None,
     colorspace: str,
@@ -46,7 +52,7 @@ def assemble(
     from quiltcli.exchange.elsewhere import MadeOptions
     from quiltcli.job import load_job
 
-    source = Source(folder, pattern, cameras, colorspace, allow_missing)
+    source = Source(folder, pattern, cameras, colorspace, allow_missing, depth)
     options = MadeOptions(output, frames, overwrite, threads or 0)
     loaded = load_job(job, sets)
     records = watched(lambda listener: put_together(loaded, source, options, listener))

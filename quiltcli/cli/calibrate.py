@@ -21,6 +21,15 @@ from quiltcli.cli.options import OVERWRITE, PATH, POINT
 @click.option("--camera", type=PATH, help="Camera file; without one the camera is sought as well.")
 @click.option("--board", default="", help="ChArUco board in some photos: 7x5,30mm,22mm,4x4.")
 @click.option("--anchor", type=int, help="Facet that stays where it is; the one seen most by default.")
+@click.option(
+    "--attached",
+    multiple=True,
+    metavar="3x2,40mm,10mm,4x4,20=1-3",
+    help="Board of markers fixed to facets: across x down, side, gap, dictionary, first id, facets.",
+)
+@click.option(
+    "--distance", "distances", multiple=True, metavar="1A-3C=1.532m", help="Measured between two corners."
+)
 @click.option("--eye", type=POINT, metavar="X,Y,Z", help="Say what uncertainty means to an eye there.")
 @click.option("--units", default="m", show_default=True, help="Unit of measured corners: m, cm, mm, in, ft.")
 @click.option("--report", type=PATH, help="Folder for residuals, pictures and the camera.")
@@ -124,12 +133,15 @@ def _from_photos(
 
     from quiltcli.calibration.panels import report
     from quiltcli.calibration.panels.calibrate import Wishes, calibrate, calibrated_files
+    from quiltcli.calibration.panels.distances import parse_distance
 
-    names = ("markers", "dictionary", "camera", "board", "anchor")
+    names = ("markers", "dictionary", "camera", "board", "anchor", "attached", "distances")
+    distances = [parse_distance(text, facets) for text in how["distances"]]
     solution, used = calibrate(facets, photos, Wishes(**{name: how[name] for name in names}))
     lines = [*report.table(solution, facets), *report.summary(solution)]
     if how["eye"] is not None:
         lines += report.at_the_eye(solution, facets, np.array(how["eye"]))
     if how["report"] is not None:
         lines += [str(path) for path in report.write_report(how["report"], solution, facets, used)]
-    return lines, calibrated_files(spec, facets, solution, mesh)
+    files, told = calibrated_files(spec, facets, solution, mesh, distances)
+    return [*lines, *told], files

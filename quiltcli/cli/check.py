@@ -24,7 +24,8 @@ def check(files: tuple[Path, ...], strict: bool, target: str | None) -> None:
     from quiltcli.analysis.check import check_files
 
     notices: list[str] = []
-    problems = check_files(files, notices.append, target or "")
+    plans: list[str] = []
+    problems = check_files(files, notices.append, target or "", plans.append)
     for problem in problems:
         click.echo(str(problem))
     if problems:
@@ -34,4 +35,6 @@ def check(files: tuple[Path, ...], strict: bool, target: str | None) -> None:
     if strict and notices:
         click.echo(f"{len(notices)} note{'s' * (len(notices) > 1)}, which --strict does not allow", err=True)
         sys.exit(1)
+    for plan in plans:
+        click.echo(plan, err=True)
     click.echo(f"{len(files)} file{'s' * (len(files) > 1)}: nothing is wrong", err=True)

@@ -17,14 +17,14 @@ from quiltcli.cli.printing import print_files
     "--format",
     "format_name",
     type=MAP_FORMAT,
-    help="obj, csv, json, mpcdi, mpcdi1, st, png or svg; of a display xyz, obj, data, st or mpcdi.",
+    help="obj, csv, json, mpcdi, mpcdi1, resolume, st, png or svg; of a display xyz, obj, data, st or mpcdi.",
 )
 @click.option("--display", type=PATH, help="Display file, instead of the one the layout names.")
 def export(layout: Path, output: Path, format_name: str | None, display: Path | None) -> None:
     """Write LAYOUT as a pixel map other tools read.
 
-    Textured mesh (.obj), table of panels (.csv), JSON (.json), MPCDI (.mpcdi), ST maps (.exr), or a
-    template picture (.png, .svg).
+    Textured mesh (.obj), table of panels (.csv), JSON (.json), MPCDI (.mpcdi), slices of Resolume (.xml),
+    ST maps (.exr), or a template picture (.png, .svg).
 
     LAYOUT may be a display file: its pixels' points in the world (.exr, .pfm, .mpcdi), or a mesh whose
     texture is its image (.obj); of a projection a warp mesh (.data), or an ST map over a plain picture

@@ -9,7 +9,7 @@ import click
 
 from quiltcli.cli.options import EXPOSURE, OVERWRITE, PATH, SIZE, frames_option
 
-_CODECS = ("prores", "h264", "h265", "dnxhr", "hap", "png", "tiff", "dpx")
+_CODECS = ("prores", "h264", "h265", "dnxhr", "hap", "dxv", "png", "tiff", "dpx")
 
 
 @click.command()

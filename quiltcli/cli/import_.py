@@ -13,7 +13,7 @@ from quiltcli.cli.options import MAP_FORMAT, PATH, SIZE
 @click.argument("file", type=PATH)
 @click.option("-o", "--output", type=PATH, required=True, help="Layout file, or display file, to write.")
 @click.option(
-    "--format", "format_name", type=MAP_FORMAT, help="obj, csv, json or mpcdi, whatever the suffix."
+    "--format", "format_name", type=MAP_FORMAT, help="obj, csv, json, mpcdi or resolume, whatever the suffix."
 )
 @click.option("--display", type=PATH, help="Display the layout is for; says what the file does not.")
 @click.option("--size", type=SIZE, help="Page size such as 3840x2160, where the file does not say it.")
@@ -26,7 +26,7 @@ def import_(
     size: tuple[int, int] | None,
     picture: Path | None,
 ) -> None:
-    """Make a layout from a pixel map: .obj, .csv, .json or .mpcdi.
+    """Make a layout from a pixel map: .obj, .csv, .json, .mpcdi or Resolume's .xml.
 
     An .mpcdi archive of the advanced 3D profile, or of shader lamps, says where pixels are in the world: of
     such a one it makes a display file, with maps beside it.

@@ -51,6 +51,7 @@ def new(kind: str | None, output: Path | None, listing: bool, **figures: Any) ->
 
     Figures that are missing are asked for on a terminal. --list names the kinds.
     """
+    from quiltcli.analysis.check import check_files
     from quiltcli.exchange.newjob.kinds import KINDS
     from quiltcli.exchange.newjob.wishes import Wishes
     from quiltcli.exchange.newjob.write import write_new_job
@@ -62,8 +63,14 @@ def new(kind: str | None, output: Path | None, listing: bool, **figures: Any) ->
     if kind is None or output is None:
         absent = "a KIND (quilt new --list names them)" if kind is None else "-o FOLDER"
         raise click.UsageError(f"expected {absent}")
-    for path in write_new_job(_complete(Wishes(kind, **figures)), output):
+    written = write_new_job(_complete(Wishes(kind, **figures)), output)
+    for path in written:
         click.echo(str(path))
+    check_files([path for path in written if path.name == "job.yaml"], _note)
+
+
+def _note(words: str) -> None:
+    click.echo(f"note: {words}", err=True)
 
 
 def _complete(wishes: Wishes) -> Wishes:

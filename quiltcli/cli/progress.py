@@ -28,7 +28,9 @@ class Progress:
     say: Callable[[str], None]
 
 
-def watched(work: Callable[[Listener], list[FrameRecord]], form: str = "auto") -> list[FrameRecord]:
+def watched(
+    work: Callable[[Listener], list[FrameRecord]], form: str = "auto", *, planned: bool = False
+) -> list[FrameRecord]:
     """Do what makes frames, with its progress on stderr; a signal that stops it ends the program.
 
     What many frames have warned of is said once they are done.
@@ -36,6 +38,7 @@ def watched(work: Callable[[Listener], list[FrameRecord]], form: str = "auto") -
     Args:
         work: does it, and tells a listener.
         form: `auto`, or `openjd` for the lines that Open Job Description reads on stdout.
+        planned: whether to say what the run will take of the machine where nobody watches, too.
     """
     from quiltcli.render.interrupt import Stopped
     from quiltcli.render.report import summary_warnings
@@ -43,8 +46,9 @@ def watched(work: Callable[[Listener], list[FrameRecord]], form: str = "auto") -
 
     with progress() as plain:
         shown = _with_farm_lines(plain) if form == "openjd" else plain
+        plan = shown.say if planned or sys.stderr.isatty() else lambda words: None
         try:
-            records = work(Listener(shown.begin, shown.frame_done, shown.say))
+            records = work(Listener(shown.begin, shown.frame_done, shown.say, plan))
         except Stopped as stopped:
             shown.say(str(stopped))
             sys.exit(stopped.exit_code)

@@ -17,7 +17,7 @@ from quiltcli.cli.options import COLORSPACE, OVERWRITE, PATH, SETS, THREADS, fra
     "path",
     type=PATH,
     required=True,
-    help="The picture; #### stands for the frame number, {face} for right, left, up, down, front, back.",
+    help="Picture or film; #### stands for the frame number, {face} for right, left, up, down, front, back.",
 )
 @click.option(
     "--as",
@@ -28,7 +28,8 @@ from quiltcli.cli.options import COLORSPACE, OVERWRITE, PATH, SETS, THREADS, fra
 )
 @click.option("-o", "--output", type=PATH, required=True, help="Folder for pages and facet images.")
 @click.option("--fov-deg", "fov", type=float, help="Of a pinhole: its angle across, as the viewer looks.")
-@click.option("--camera", type=PATH, help="Of a pinhole: its camera, in JSON as of quilt cameras.")
+@click.option("--camera", type=PATH, help="Of a pinhole: its camera, in USD, glTF or JSON of quilt cameras.")
+@click.option("--camera-name", default="", help="Which camera of the file.")
 @click.option("--yaw-deg", "yaw", type=float, default=0.0, help="Turn its front from −Z to the left.")
 @click.option("--aperture-deg", "aperture", type=float, default=180.0, help="Of a fisheye: its circle.")
 @click.option("--tilt-deg", "tilt", type=float, default=0.0, help="Of a fisheye: its middle from the zenith.")

@@ -19,8 +19,11 @@ from quiltcli.cli.printing import print_aligned
 @click.option("--resume", is_flag=True, help="Skip frames that are complete and made by the same job.")
 @OVERWRITE
 @click.option(
-    "--facets", type=FACETS, help="Draw only these facets, such as 3,7-9 or left,right, into existing quilts."
+    "--facets",
+    type=FACETS,
+    help="Draw only these facets, such as 3,7-9 or left,right, into existing quilts, if it has quilts.",
 )
+@click.option("--eye", type=click.Choice(("left", "right")), help="Draw only one eye of two.")
 @click.option(
     "--positions",
     type=POSITIONS,
@@ -42,7 +45,12 @@ from quiltcli.cli.printing import print_aligned
 )
 @click.option("--dry-run", is_flag=True, help="Find every problem, write nothing.")
 @click.option("--scale", metavar="SHARE", help="Draw fewer pixels, 1/4 across and down, for a proxy.")
-@click.option("--max-memory", "memory", metavar="SIZE", help="Take at most so much, such as 8GB, or refuse.")
+@click.option(
+    "--max-memory",
+    "memory",
+    metavar="SIZE",
+    help="Take at most so much, such as 8GB: fewer workers, or refuse.",
+)
 @click.option("--strict", is_flag=True, help="Refuse what would only be worth a second look.")
 @click.option("--profile", is_flag=True, help="Say where the time went, by stage.")
 @SETS
@@ -53,6 +61,7 @@ def render(
     resume: bool,
     overwrite: bool,
     facets: tuple[int, ...] | str | None,
+    eye: str | None,
     positions: tuple[int, ...] | None,
     threads: int | None,
     scheduler: str | None,
@@ -78,9 +87,9 @@ def render(
         sets = (*sets, f"render.scale={scale}")
     loaded = load_job(job, sets)
     if loaded.ring is not None:
-        if facets is not None or scheduler is not None:
+        if facets is not None or eye is not None or scheduler is not None:
             words = "a 360° light field display has no facets, and its turns are drawn by one machine's cores"
-            raise click.UsageError(f"--facets, --scheduler: {words} (--positions draws some of them)")
+            raise click.UsageError(f"--facets, --eye, --scheduler: {words} (--positions draws some of them)")
         from quiltcli.render.ring.walk import RingOptions
 
         how = RingOptions(frames, output, positions, resume, overwrite, threads or 0, dry_run, strict)
@@ -89,7 +98,7 @@ def render(
     if positions is not None:
         raise click.UsageError("--positions are a 360° light field display's, and this job's has facets")
     ids = _named(loaded, facets) if isinstance(facets, str) else facets
-    options = RenderOptions(frames, output, resume, overwrite, ids, threads or 0, dry_run, strict)
+    options = RenderOptions(frames, output, resume, overwrite, ids, eye, threads or 0, dry_run, strict)
     records = _render(loaded, options, scheduler, progress)
     if profile and records:
         _print_profile(records)
@@ -115,7 +124,7 @@ def _render(job: Any, options: Any, scheduler: str | None, form: str) -> Any:
             return render_here(job, options, listener)
         return render_on(scheduler, job, options, listener)
 
-    records = watched(work, form)
+    records = watched(work, form, planned=options.dry_run)
     if options.dry_run:
         click.echo("nothing is wrong with this job")
     elif records:

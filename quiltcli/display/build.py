@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from quiltcli.display.blending import blended
 from quiltcli.display.check import called, check_polygons
 from quiltcli.display.curved import joined, projection_facets, surface_facets
 from quiltcli.display.facets import Facets, places_of
 from quiltcli.display.notices import likely_unit
 from quiltcli.display.panels import panel_facets
 from quiltcli.display.points import point_facets
+from quiltcli.display.projectors import projector_facets
 from quiltcli.display.rasters import LEVEL, MOST_PIXELS, Rasters, axes, into_plane, rasters, turned, upward
 from quiltcli.display.response import response_of
 from quiltcli.errors import DisplayError, Problem, first_of, raise_all
@@ -33,8 +35,13 @@ def load_display(spec: DisplayFile) -> Facets:
         MeshError: the mesh cannot be read.
         DisplayError: the mesh or the display file makes no facets; every problem found is in it.
     """
-    facets = _facets(spec)
-    response = response_of(spec, facets.charts, facets.count)
+    blend = None
+    if spec.projectors is None:
+        facets = _facets(spec)
+    else:
+        facets, projectors = projector_facets(spec, load_display)
+        blend = blended(spec, projectors)
+    response = response_of(spec, facets.charts, facets.count, blend)
     return facets if response is None else replace(facets, response=response)
 
 

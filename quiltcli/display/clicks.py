@@ -9,10 +9,8 @@ import numpy as np
 
 from quiltcli.errors import DisplayError
 from quiltcli.geometry import FloatArray
-from quiltcli.geometry.resection import Pinhole, Refined, decomposed, dlt, refine
+from quiltcli.geometry.resection import DETERMINED, Pinhole, Refined, decomposed, dlt, lie_in_plane, refine
 from quiltcli.job.calibration import CalibrationFile, ClickSpec
-
-_DETERMINED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -69,12 +67,11 @@ def calibrate(file: CalibrationFile) -> Calibration:
     """
     points = np.stack([world_point(click, file.tilt_deg, file.ridge) for click in file.points])
     pixels = np.array([click.pixel for click in file.points], dtype=np.float64)
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if spread[2] < _DETERMINED * spread[0]:
+    if lie_in_plane(points):
         words = "all lie in one plane, which leaves the projector open (turn the mirror for some of them)"
         raise DisplayError(file.source.problem("points", words))
     direct, determined = dlt(points, pixels)
-    if determined < _DETERMINED:
+    if determined < DETERMINED:
         words = "leave the projector open: several fit (add points elsewhere on the mirror)"
         raise DisplayError(file.source.problem("points", words))
     found = _fitted(file, direct, points, pixels)

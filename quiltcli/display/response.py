@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,6 +26,22 @@ from quiltcli.job.dump import plain
 _PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))
 _WHITE = (0.3127, 0.3290)
 _EDGE_ON = 1e-9
+Place: TypeAlias = tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Blend:
+    """What blending makes of pictures.
+
+    Attributes:
+        shares: of each projector (H, W) shares of the light; 0 outside its mask.
+        lift: of each (H, W) light that is added to make black even; empty where that is not known to differ.
+        black: light of a black pixel as a share of a white one's.
+    """
+
+    shares: tuple[FloatArray, ...]
+    lift: tuple[FloatArray, ...]
+    black: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +59,7 @@ class Response:
         gain: (F, 3) what each facet's light is multiplied by, its white point's part too.
         power: (F,) gamma of each panel over that of the signal.
         record: all of this in words, JSON, for images.
+        blend: how pictures of projectors overlap; None where there are none.
     """
 
     exponent: float
@@ -54,6 +72,12 @@ class Response:
     gain: FloatArray
     power: FloatArray
     record: str
+    blend: Blend | None = None
+
+    @property
+    def lifts(self) -> bool:
+        """Whether images that are black are not, once corrected."""
+        return self.blend is not None and bool(self.blend.lift)
 
     def brightness(self, cosine: FloatArray) -> FloatArray:
         """How bright panels are at angles with these cosines (P,): (P,), or (3, P) by a table."""
@@ -67,14 +91,40 @@ class Response:
         """What light is multiplied by to make up for the angle, `limit` at most: (P,) or (3, P)."""
         return np.minimum(1.0 / self.brightness(cosine), self.limit)
 
-    def wanted(self, facet: int, light: FloatArray, cosine: FloatArray) -> FloatArray:
-        """Images (3, P) that make a facet show light (3, P), whether or not the panel can give that."""
+    def wanted(
+        self, facet: int, light: FloatArray, cosine: FloatArray, place: Place | None = None
+    ) -> FloatArray:
+        """Images that make a facet show some light, whether or not the panel can give that.
+
+        Args:
+            facet: 0-based.
+            light: (3, P).
+            cosine: (P,) of the angles at which pixels are seen.
+            place: x and y (P,) of the pixels, facet pixels; where pictures are blended.
+
+        Returns:
+            (3, P).
+        """
         image = light * (self.level * self.gain[facet])[:, None] * self.brightening(cosine)
+        if self.blend is not None and place is not None:
+            image = image * self._at(self.blend.shares[facet], place)
+            if self.blend.lift:
+                image = image + self._at(self.blend.lift[facet], place)
         return _raised(image, 1.0 / float(self.power[facet]))
+
+    @staticmethod
+    def _at(values: FloatArray, place: Place) -> FloatArray:
+        """Values (H, W) of the pixels under places."""
+        high, wide = values.shape
+        column = np.clip(np.floor(place[0]), 0, wide - 1).astype(np.int64)
+        row = np.clip(np.floor(place[1]), 0, high - 1).astype(np.int64)
+        return values[row, column]
 
     def shown(self, facet: int, image: FloatArray, cosine: FloatArray) -> FloatArray:
         """The light (3, P) of a facet's image (3, P) as it is seen at angles with these cosines (P,)."""
         light = _raised(image, float(self.power[facet]))
+        if self.blend is not None:
+            light = light + self.blend.black
         return np.asarray(light / self.gain[facet][:, None] * self.brightness(cosine))
 
 
@@ -82,20 +132,25 @@ def _raised(light: FloatArray, power: float) -> FloatArray:
     return light if power == 1 else np.asarray(np.copysign(np.abs(light) ** power, light))
 
 
-def response_of(spec: DisplayFile, charts: tuple[Chart | None, ...], count: int) -> Response | None:
+def response_of(
+    spec: DisplayFile, charts: tuple[Chart | None, ...], count: int, blend: Blend | None = None
+) -> Response | None:
     """The response that a display file tells of its facets; None where it tells none.
 
     Args:
         spec: the file.
         charts: the facets' charts; empty where all are flat.
         count: how many facets there are.
+        blend: how pictures of projectors overlap.
 
     Raises:
         DisplayError: it speaks of facets that there are not, or of whites that no panel has.
     """
     given = spec.corrections
     if given is None:
-        return None
+        if blend is None:
+            return None
+        given = CorrectionsSpec.model_construct()
     raise_all(DisplayError, _problems(spec, given, charts, count))
     gain, power = np.ones((count, 3)), np.ones(count)
     for facet, own in given.facets.items():
@@ -104,6 +159,9 @@ def response_of(spec: DisplayFile, charts: tuple[Chart | None, ...], count: int)
             gain[facet - 1] *= white_gain(own.white)
         if own.gamma is not None:
             power[facet - 1] = own.gamma / given.signal_gamma
+    record = {} if spec.corrections is None else plain(given, str)
+    if spec.blend is not None:
+        record["blend"] = plain(spec.blend, str)
     how = given.brightness
     table = None if how is None or how.table is None else np.array(how.table)
     return Response(
@@ -116,7 +174,8 @@ def response_of(spec: DisplayFile, charts: tuple[Chart | None, ...], count: int)
         clip=given.clip,
         gain=gain,
         power=power,
-        record=json.dumps(plain(given, str), sort_keys=True, separators=(",", ":")),
+        record=json.dumps(record, sort_keys=True, separators=(",", ":")),
+        blend=blend,
     )
 
 

@@ -1,7 +1,8 @@
 """Pictures of facets that another renderer has made through exported cameras, put into pages.
 
 What another program has drawn of a facet is the facet's own raster, pixel by pixel: nothing is resampled.
-It is cut at the polygon; its last pixels are repeated in the bleed.
+It is cut at the polygon; its last pixels are repeated in the bleed. Channels beside colours, which the job
+wants and the first picture has, come along, and all pictures must have them.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from quiltcli.display.check import called
 from quiltcli.errors import JobError, OutputError, Problem, QuiltError, raise_all
-from quiltcli.exchange.elsewhere import HalfArray, Made, MadeOptions, half, prepare_made, write_made
+from quiltcli.exchange.elsewhere import Made, MadeOptions, half, prepare_made, write_made
+from quiltcli.exchange.layers import layers_of, read_layers
 from quiltcli.formats.pictures import SUFFIXES, picture_size, read_picture
 from quiltcli.images.facets import lay_facet
 from quiltcli.images.names import fit_names
@@ -44,6 +47,7 @@ class Source:
         cameras: the file of the cameras; pictures that are older are refused.
         colorspace: as for `read_picture`.
         lenient: leave what is missing dark.
+        depth: what depth of the pictures measures, as for `read_layers`.
     """
 
     folder: Path
@@ -51,6 +55,7 @@ class Source:
     cameras: Path | None = None
     colorspace: str = "auto"
     lenient: bool = False
+    depth: str | None = None
 
 
 def assemble(
@@ -66,7 +71,11 @@ def assemble(
     pattern = _pattern(source.pattern, job)
     if not source.folder.is_dir():
         raise OutputError(Problem("is no folder (expected one with pictures of facets)", str(source.folder)))
-    ready = prepare_made(job, options, "assemble")
+
+    def beside(stage: Stage, views: Sequence[View]) -> tuple[str, ...]:
+        return Pictures(stage, source, pattern).channels(views, job.output.channels)
+
+    ready = prepare_made(job, options, "assemble", beside)
     pictures = Pictures(ready.stage, source, pattern)
     raise_all(OutputError, _all_problems(ready, pictures, options.threads or default_threads()))
     threads = options.threads or default_threads()
@@ -107,6 +116,15 @@ class Pictures:
         paths = [self.source.folder / (name + ending) for ending in self._endings]
         return next((path for path in paths if path.is_file()), paths[0])
 
+    def channels(self, views: Sequence[View], wanted: Sequence[str]) -> tuple[str, ...]:
+        """Those of the channels `wanted` beside colours that the first picture has."""
+        paths = (self.path(view, row) for view in views for row in self.wanted(view))
+        first = next((path for path in paths if path.is_file()), None)
+        try:
+            return () if first is None else layers_of(first, wanted)
+        except OutputError:  # told with all that is wrong with the pictures
+            return ()
+
     def wanted(self, view: View) -> list[int]:
         """Rows of the facets that are lit in a view."""
         lit = view_lit(self.stage, view) & (self.stage.layout.page >= 0)
@@ -130,6 +148,10 @@ class Pictures:
         if found != size:
             words = f"is {found[0]}×{found[1]} pixels, {named} is {size[0]}×{size[1]}"
             return Problem(words, file=str(path))
+        asked = self.stage.job.output.channels[1:]
+        if lacking := sorted(set(asked) - set(layers_of(path, asked))):
+            words = f"lacks {', '.join(lacking)}, which the first picture has"
+            return Problem(f"{words} (--set output.channels=[rgba] does without)", file=str(path))
         return None
 
 
@@ -171,6 +193,10 @@ def _lay(pictures: Pictures, view: View, buffers: Buffers, row: int) -> int:
     light = read_picture(pictures.path(view, row), pictures.source.colorspace)
     light[..., :3] += (1 - light[..., 3:]) * np.asarray(stage.scene.background, dtype=np.float32)
     values = half(light)
-    channels: dict[str, HalfArray] = {name: values[..., c] for c, name in enumerate("RGBA")}
+    channels: dict[str, Any] = {name: values[..., c] for c, name in enumerate("RGBA")}
+    if layers := stage.job.output.channels[1:]:
+        viewer = view.viewer_of(int(stage.layout.facet[row]))
+        path, depth = pictures.path(view, row), pictures.source.depth
+        channels |= read_layers(path, layers, stage.layout, row, viewer, depth)
     lay_facet(buffers, channels, stage.layout, row, stage.owners, stage.job.render.bleed)
     return int(np.count_nonzero(values[..., 3] > 0))

@@ -62,13 +62,19 @@ class Made:
     warnings: tuple[str, ...] = ()
 
 
-def prepare_made(job: JobFile, options: MadeOptions, word: str) -> Prepared:
+def prepare_made(
+    job: JobFile,
+    options: MadeOptions,
+    word: str,
+    also: Callable[[Stage, Sequence[View]], tuple[str, ...]] = lambda stage, views: (),
+) -> Prepared:
     """Load what a job names, and find every reason not to write its images.
 
     Args:
-        job: the job; of its channels colours alone are written.
+        job: the job; of its channels colours are written.
         options: what the command line says beside it.
         word: what makes the pixels, for the attribute `quilt:made`.
+        also: the job's channels that are written beside colours.
 
     Raises:
         QuiltError: bad input, or files that are in the way.
@@ -78,6 +84,10 @@ def prepare_made(job: JobFile, options: MadeOptions, word: str) -> Prepared:
     frames = list(job.frames if options.frames is None else options.frames)
     stage = set_stage(job, options.folder)
     views = stage.views(frames)
+    if channels := also(stage, views):
+        output = job.output.model_copy(update={"channels": ("rgba", *channels)})
+        job = job.model_copy(update={"output": output})
+        stage = replace(stage, job=job)
     out = outputs(stage, options.folder, job_sha256(job))
     out = replace(out, besides=out.besides | {"quilt:made": word})
     if not options.overwrite:

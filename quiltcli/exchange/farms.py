@@ -1,22 +1,30 @@
 """Jobs as render farms take them: an Open Job Description template, or an outline of OpenCue.
 
-Both hand out frames and call `quilt render --resume`, so a task that is given out twice, or again after its
-machine died, does no harm: what is finished is kept, and the pixels do not depend on who drew them.
+Both hand out frames, and eyes and facets if wanted, and call `quilt render --resume`, so a task that is given
+out twice, or again after its machine died, does no harm: what is finished is kept, and the pixels do not
+depend on who drew them.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from quiltcli.errors import OutputError, Problem
+import numpy as np
+
+from quiltcli.display import load_display
+from quiltcli.errors import JobError, OutputError, Problem
 from quiltcli.formats.whole import make_folder, write_text
-from quiltcli.job import JobFile
+from quiltcli.images.names import fit_names
+from quiltcli.job import JobFile, load_display_file
 from quiltcli.job.dump import dump_yaml
 from quiltcli.job.frames import format_frames
+from quiltcli.viewer.view import EYES
 
 
 @dataclass(frozen=True)
@@ -27,11 +35,15 @@ class FarmOptions:
         chunk: frames a task.
         command: how quilt is called there.
         threads: of a task; None for every core.
+        by: what is handed out beside frames, names of `DIMENSIONS`.
+        sets: values of the job's keys that the command line changes, `KEY=VALUE`.
     """
 
     chunk: int = 10
     command: str = "quilt"
     threads: int | None = None
+    by: tuple[str, ...] = ()
+    sets: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -45,6 +57,48 @@ class Places:
     def beside(self, path: Path) -> str:
         """A path from the farm's file, with forward slashes."""
         return Path(os.path.relpath(path, self.folder)).as_posix()
+
+
+DIMENSIONS = ("eyes", "facets")
+
+
+@dataclass(frozen=True)
+class Handed:
+    """What is handed out beside frames.
+
+    Attributes:
+        eyes: each one's name, or nothing where both are drawn at once.
+        facets: id and name of each, or nothing where all are drawn at once.
+    """
+
+    eyes: tuple[str, ...] = ()
+    facets: tuple[tuple[int, str], ...] = ()
+
+
+def handed_out(job: JobFile, by: Sequence[str]) -> Handed:
+    """Eyes and facets of a job that are to be tasks of their own.
+
+    Raises:
+        JobError: several of them share a file.
+    """
+    eyes: tuple[str, ...] = ()
+    facets: tuple[tuple[int, str], ...] = ()
+    if "eyes" in by:
+        if not job.is_stereo:
+            raise JobError("--by eyes: the job has one eye (viewer.stereo gives it two)")
+        if job.output.stereo == "parts":
+            raise JobError("--by eyes: both eyes are parts of one file (output.stereo: files makes two)")
+        eyes = EYES
+    if "facets" in by:
+        if job.output.quilts:
+            words = "--by facets: the pages of a quilt hold facets together, and are drawn whole"
+            raise JobError(
+                f"{words} (--set output.quilts=false writes facets alone; quilt assemble makes pages)"
+            )
+        found = load_display(load_display_file(job.display))
+        names = fit_names(found.names)
+        facets = tuple((k + 1, names[k]) for k in np.flatnonzero(found.enabled).tolist())
+    return Handed(eyes, facets)
 
 
 def write_farm_job(path: Path, job_path: Path, job: JobFile, options: FarmOptions) -> None:
@@ -71,13 +125,22 @@ def openjd_text(places: Places, job: JobFile, options: FarmOptions) -> str:
     """
     args = ["render", "{{Param.Job}}", "--frames", "{{Task.Param.Frame}}", "--output", "{{Param.OutputDir}}"]
     args += ["--resume", "--progress", "openjd"]
-    args += ["--threads", str(options.threads)] if options.threads else []
-    frame = {
+    args += _more(options)
+    handed = handed_out(job, options.by)
+    frame: dict[str, Any] = {
         "name": "Frame",
         "type": "CHUNK[INT]",
         "range": "{{Param.Frames}}",
         "chunks": {"defaultTaskCount": "{{Param.ChunkSize}}", "rangeConstraint": "CONTIGUOUS"},
     }
+    space = [frame]
+    if handed.eyes:
+        args += ["--eye", "{{Task.Param.Eye}}"]
+        space.append({"name": "Eye", "type": "STRING", "range": list(handed.eyes)})
+    if handed.facets:
+        args += ["--facets", "{{Task.Param.Facet}}"]
+        ids = [facet for facet, _ in handed.facets]
+        space.append({"name": "Facet", "type": "INT", "range": format_frames(ids).replace("x", ":")})
     action = {
         "command": "{{Param.Quilt}}",
         "args": args,
@@ -100,7 +163,7 @@ def openjd_text(places: Places, job: JobFile, options: FarmOptions) -> str:
         "steps": [
             {
                 "name": "Render",
-                "parameterSpace": {"taskParameterDefinitions": [frame]},
+                "parameterSpace": {"taskParameterDefinitions": space},
                 "script": {"actions": {"onRun": action}},
             }
         ],
@@ -121,7 +184,8 @@ outline = Outline(
     show=os.environ.get("SHOW", "testing"),
     user=os.environ.get("USER", "quilt"),
 )
-outline.add_layer(Shell("render", command=@COMMAND@, range=@FRAMES@, chunk=1))
+for name, command in @LAYERS@:
+    outline.add_layer(Shell(name, command=command, range=@FRAMES@, chunk=1))
 
 if __name__ == "__main__":
     cuerun.launch(outline)
@@ -129,12 +193,29 @@ if __name__ == "__main__":
 
 
 def outline_text(places: Places, job: JobFile, options: FarmOptions) -> str:
-    """A script for PyOutline with a layer of one frame a task; #IFRAME# becomes the frame's number there."""
+    """A script for PyOutline with a layer of one frame a task; #IFRAME# becomes the frame's number there.
+
+    Eyes and facets that are handed out have a layer each.
+    """
     command = [options.command, "render", places.job.absolute().as_posix(), "--frames", "#IFRAME#"]
-    command += ["--output", places.out.absolute().as_posix(), "--resume"]
-    command += ["--threads", str(options.threads)] if options.threads else []
-    text = _OUTLINE.replace("@COMMAND@", json.dumps(command)).replace("@NAME@", json.dumps(_name(places.job)))
+    command += ["--output", places.out.absolute().as_posix(), "--resume", *_more(options)]
+    handed = handed_out(job, options.by)
+    layers = []
+    for eye in handed.eyes or ("",):
+        for facet, name in handed.facets or ((0, ""),):
+            also = ["--eye", eye] if eye else []
+            also += ["--facets", str(facet)] if facet else []
+            word = "_".join(filter(None, ("render", eye, re.sub(r"\W", "_", name))))
+            layers.append([word, command + also])
+    text = _OUTLINE.replace("@LAYERS@", json.dumps(layers, indent=4))
+    text = text.replace("@NAME@", json.dumps(_name(places.job)))
     return text.replace("@FRAMES@", json.dumps(format_frames(job.frames)))
+
+
+def _more(options: FarmOptions) -> list[str]:
+    """Options of every task."""
+    threads = ["--threads", str(options.threads)] if options.threads else []
+    return [*threads, *(word for one in options.sets for word in ("--set", one))]
 
 
 def _name(job_path: Path) -> str:

@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.geometry import FloatArray, IntArray, offsets, segments, some_rows
+from quiltcli.geometry import (
+    FloatArray,
+    IntArray,
+    cross,
+    dot,
+    next_in_row,
+    normalized,
+    offsets,
+    segments,
+    some_rows,
+)
 
 BY_FACE = ("uniform", "faceVarying")
 """Interpolations by which corners of one vertex may differ; the others are constant, vertex and varying."""
@@ -184,6 +194,35 @@ def dressed(
     apart = [normals.row] if normals is not None and moving and normals.by_face else []
     worn = [one for one in (*uv, color, opacity, None if apart else normals) if one is not None]
     return Dress(uv, color, opacity, _variants(worn, apart))
+
+
+def same_normals(faces: Faces, normals: Carried) -> IntArray:
+    """Numbers (C,) that corners of one vertex and one normal share."""
+    return _joined(faces.corners.vertex, _numbered(normals))
+
+
+def normals_of_groups(points: FloatArray, faces: Faces, group: IntArray) -> FloatArray:
+    """Normals (C, 3) of corners: the mean of the faces around, those of a group (C,) having the same.
+
+    Corners are weighted by |a × b| / (|a|² |b|²) of their edges a and b (Max, Weights for computing vertex
+    normals from facet normals, 1999), which needs no angles.
+    """
+    vertex, start = faces.corners.vertex, faces.start
+    here = points[vertex]
+    after = here[next_in_row(start)]
+    before = np.empty_like(here)
+    before[next_in_row(start)] = here
+    row, _ = segments(start)
+    # Twice a polygon's area, in the direction of its normal (Newell).
+    own = np.zeros((len(start) - 1, 3))
+    np.add.at(own, row, cross(here, after))
+    a, b = after - here, before - here
+    turn = cross(a, b)
+    scale = dot(a, a) * dot(b, b)
+    weight = np.divide(np.sqrt(dot(turn, turn)), scale, out=np.zeros_like(scale), where=scale > 0)
+    total = np.zeros((int(group.max(initial=-1)) + 1, 3))
+    np.add.at(total, group, weight[:, None] * normalized(own)[row])
+    return normalized(total)[group]
 
 
 def _variants(worn: Sequence[Carried], apart: Sequence[IntArray]) -> IntArray | None:

@@ -64,7 +64,7 @@ def read_picture(path: Path, colorspace: str = "auto") -> Float32Array:
     apart = bool(spec.get_int_attribute("oiio:UnassociatedAlpha", 0))
     pixels = np.asarray(pixels).reshape(height, width, channels)
     curved = colorspace == "srgb" or (colorspace == "auto" and whole)
-    return _linear(pixels, curved, apart)
+    return linear_light(pixels, curved, apart)
 
 
 def _opened(path: Path) -> Any:
@@ -80,8 +80,8 @@ def _opened(path: Path) -> Any:
     return file
 
 
-def _linear(pixels: NDArray[Any], curved: bool, apart: bool) -> Float32Array:
-    """Light (H, W, 4) of pixels (H, W, C)."""
+def linear_light(pixels: NDArray[Any], curved: bool, apart: bool) -> Float32Array:
+    """Light (H, W, 4) of pixels (H, W, C): whether on the curve of sRGB, and not yet multiplied by alpha."""
     height, width, channels = pixels.shape
     light = np.empty((height, width, 4), dtype=np.float32)
     for to, c in zip(range(3), (0, 1, 2) if channels >= 3 else (0, 0, 0), strict=True):

@@ -37,6 +37,7 @@ class Coding:
         container_options: of the file.
         tag: four letters by which players know the codec, where the file's own are not the best.
         least: width and height that the encoder takes at least.
+        multiple: of which width and height must be multiples.
     """
 
     container: str
@@ -47,6 +48,7 @@ class Coding:
     container_options: dict[str, str]
     tag: str = ""
     least: tuple[int, int] = (2, 2)
+    multiple: int = 1
 
     @property
     def depth(self) -> int:
@@ -85,8 +87,10 @@ CODECS = {
         {},
         least=(256, 120),
     ),
+    # FFmpeg's files of other sizes come back as noise.
+    "dxv": Coding("mov", "dxv", "rgba", "rgb24", {"threads": "1"}, {}, multiple=16),
 }
-"""By name; DNxHR is HQX, 10 bits."""
+"""By name; DNxHR is HQX, 10 bits; DXV is Resolume's, of DXT1 without alpha."""
 
 
 def coding_of(path: Path) -> Coding:
@@ -100,11 +104,12 @@ def coding_of(path: Path) -> Coding:
     if coding is None:
         wrong = "a film's name must end in .mp4 (H.264) or .mov (ProRes)"
         raise OutputError(Problem(wrong, file=str(path)))
-    _av()
+    load_av()
     return coding
 
 
-def _av() -> Any:
+def load_av() -> Any:
+    """PyAV (MissingExtraError where it is not installed)."""
     try:
         import av
     except ImportError:
@@ -130,7 +135,7 @@ def film(path: Path, fps: Fraction, coding: Coding | None = None) -> Iterator[Ca
         OutputError: the film cannot be written, or its name says of no coding; nothing is left behind.
         MissingExtraError: PyAV is not installed.
     """
-    coding, av = coding or coding_of(path), _av()
+    coding, av = coding or coding_of(path), load_av()
     make_folder(path.parent)
     with whole_file(path) as temporary:
         try:
@@ -144,6 +149,10 @@ def film(path: Path, fps: Fraction, coding: Coding | None = None) -> Iterator[Ca
                         width, height = coding.least
                         words = f"{coding.codec} takes pictures of {width}×{height} pixels or more"
                         raise OutputError(Problem(words, file=str(path)))
+                    if picture.shape[1] % coding.multiple or picture.shape[0] % coding.multiple:
+                        found = f"{picture.shape[1]}×{picture.shape[0]}"
+                        words = f"{coding.codec} takes width and height in multiples of {coding.multiple}"
+                        raise OutputError(Problem(f"{words}, and this is {found} pixels", file=str(path)))
                     container.mux(_encoded(av, stream, coding, picture))
 
                 yield show

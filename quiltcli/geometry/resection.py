@@ -16,6 +16,8 @@ from quiltcli.geometry.quaternions import exponential, matrices
 
 UNKNOWNS = 9
 """Focal length, centre (2), rotation (3) and position (3)."""
+DETERMINED = 1e-6
+"""Below this share of the largest, a singular value says that something is left open."""
 _STEPS = 300
 
 
@@ -74,6 +76,29 @@ def dlt(points: FloatArray, pixels: FloatArray) -> tuple[FloatArray, float]:
     _, singular, axes = np.linalg.svd(rows)
     matrix = np.linalg.inv(image) @ axes[-1].reshape(3, 4) @ world
     return matrix, float(singular[-2] / singular[0])
+
+
+def lie_in_plane(points: FloatArray) -> bool:
+    """Whether points (N, 3) lie in a plane, which leaves a projector open that lights them."""
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(spread[2] < DETERMINED * spread[0])
+
+
+def resected(points: FloatArray, pixels: FloatArray) -> Refined | None:
+    """The pinhole that fits points and pixels best, wherever they are; None where several do.
+
+    Args:
+        points: (N, 3), six at least, not all in a plane.
+        pixels: (N, 2).
+    """
+    middle = points.mean(axis=0)
+    direct, determined = dlt(points - middle, pixels)
+    if determined < DETERMINED:
+        return None
+    # `decomposed` takes what is ahead from the origin, which lies among the points.
+    start = decomposed(direct)[1]
+    start = replace(start, position=start.position + middle)
+    return refine(start, points, pixels, np.ones(UNKNOWNS, dtype=np.bool_))
 
 
 def decomposed(matrix: FloatArray) -> tuple[FloatArray, Pinhole]:

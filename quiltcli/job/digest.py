@@ -36,7 +36,7 @@ def job_sha256(job: JobFile) -> str:
     read, whatever they are by now.
     """
     data = plain(job, file_sha256)
-    data["display"] = plain(load_any_display(job.display), file_sha256)
+    data["display"] = _display(job.display)
     data["scene"] = _scene(job.scene) if job.lightfield is None else _lightfield(job.scene, job.frames)
     if isinstance(job.layout, Path):
         data["layout"] = _layout_sha256(job.layout)
@@ -71,6 +71,14 @@ def _layout_sha256(path: Path) -> str:
 def _text_sha256(data: Any) -> str:
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _display(path: Path) -> dict[str, Any]:
+    """A display, with the display that is its screen."""
+    display = load_any_display(path)
+    data: dict[str, Any] = plain(display, file_sha256)
+    screen = getattr(display, "screen", None)
+    return data if screen is None else data | {"screen": plain(load_any_display(screen), file_sha256)}
 
 
 def _scene(path: Path) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -15,9 +16,11 @@ from quiltcli.job.layout import UvLayoutSpec
 from quiltcli.job.lengths import UNITS, Coordinate, Length, UpAxis, exact_metres, read_length, up_matrix
 from quiltcli.job.model import (
     FARTHEST,
+    YAMLS,
     Complaint,
     Count,
     Direction,
+    ExistingFile,
     FileModel,
     Items,
     Listed,
@@ -36,6 +39,7 @@ from quiltcli.job.model import (
 from quiltcli.job.places import PlaceOnPage, Quarter
 from quiltcli.job.points import PointsSpec
 from quiltcli.job.projections import ProjectionSpec
+from quiltcli.job.projectors import BlendSpec, ProjectorSpec
 from quiltcli.job.surfaces import SurfaceSpec
 
 
@@ -220,6 +224,12 @@ class DisplayFile(FileModel):
     """Single lights, instead of a mesh, panels or surfaces; each is a facet of one pixel."""
     projection: ProjectionSpec | None = None
     """A picture around the eye that goes along with it, instead of anything that stands in the world."""
+    projectors: Annotated[tuple[ProjectorSpec, ...], Listed, Field(min_length=1)] | None = None
+    """Projectors instead of anything that shines itself; each is one facet, in this order."""
+    screen: Annotated[Path, ExistingFile(YAMLS, "a display file")] | None = None
+    """What the projectors light: a display file with a mesh, panels or surfaces, whatever their pixels."""
+    blend: BlendSpec | None = None
+    """How pictures of projectors overlap; they add up as they are when absent."""
     units: Units = "m"
     """What the mesh or the panels are measured in: m, cm, mm, in, ft, or a number of metres."""
     up_axis: UpAxis = "y"
@@ -253,6 +263,9 @@ class DisplayFile(FileModel):
 
     def cross_checks(self) -> Iterator[Complaint]:
         """A mesh or panels, each with keys of its own; a mirrored display would be lit on the wrong side."""
+        yield from self._of_projectors()
+        if self.projectors is not None:
+            return
         if self.projection is not None:
             yield from self._beside_projection()
             return
@@ -288,6 +301,24 @@ class DisplayFile(FileModel):
                 ("viewing_side",),
                 "expected front or both beside panels (turn one by yaw_deg: 180), got back",
             )
+
+    def _of_projectors(self) -> Iterator[Complaint]:
+        """Projectors are all of their display, and need a screen; nothing else has one."""
+        if self.projectors is None:
+            for name in ("screen", "blend"):
+                if getattr(self, name) is not None:
+                    yield (name,), "belongs to projectors (expected projectors: a list of them)"
+            return
+        for name in ("mesh", "panels", "surfaces", "projection", "resolution", "transform", "layout"):
+            if getattr(self, name) is not None:
+                yield (name,), "cannot stand beside projectors (the screen's file says where it stands)"
+        if self.facets:
+            yield ("facets",), "cannot stand beside projectors (name, mask and place are keys of each)"
+        for name, default in (("viewing_side", "front"), ("up_axis", "y")):
+            if getattr(self, name) != default:
+                yield (name,), f"cannot stand beside projectors, got {getattr(self, name)}"
+        if self.screen is None and any(one.map is None for one in self.projectors):
+            yield ("screen",), "missing key (a display file: what the projectors light)"
 
     def _beside_projection(self) -> Iterator[Complaint]:
         """A projection is all of its display, and stands nowhere in the world."""

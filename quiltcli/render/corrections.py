@@ -17,7 +17,7 @@ import numpy as np
 from quiltcli.channels import MOST_HALF
 from quiltcli.display import Facets
 from quiltcli.display.check import called
-from quiltcli.display.response import Response
+from quiltcli.display.response import Place, Response
 from quiltcli.geometry import BoolArray, FloatArray, OwnerArray
 from quiltcli.images.facets import page_of, surroundings
 from quiltcli.job import JobFile
@@ -115,15 +115,16 @@ def correct(
     if only is not None:
         lit &= only
     rows = np.flatnonzero(lit).tolist()
-    found = on_panels(stage, stage.owners, rows, buffers, viewer.eye, partial(_corrected, response), threads)
+    change = partial(_corrected, response)
+    found = on_panels(stage, stage.owners, rows, buffers, viewer.eye, change, threads, black=response.lifts)
     return sum(found, Headroom())
 
 
 def _corrected(
-    response: Response, row: int, light: FloatArray, cosine: FloatArray
+    response: Response, row: int, light: FloatArray, cosine: FloatArray, place: Place
 ) -> tuple[FloatArray, Headroom]:
     """The image (3, P) of a facet for light (3, P) at angles with these cosines (P,), and what it asked."""
-    wanted = response.wanted(row, light, cosine)
+    wanted = response.wanted(row, light, cosine, place)
     most = min(response.peak, float(MOST_HALF)) if response.clip else float(MOST_HALF)
     brightness = response.brightness(cosine)
     high = wanted.max(axis=0) / response.peak
@@ -138,8 +139,8 @@ def _corrected(
 
 
 T = TypeVar("T")
-Change: TypeAlias = Callable[[int, FloatArray, FloatArray], tuple[FloatArray, T]]
-"""From a facet, light (3, P) and cosines (P,) of its angles to other light (3, P), and what to say of it."""
+Change: TypeAlias = Callable[[int, FloatArray, FloatArray, Place], tuple[FloatArray, T]]
+"""From a facet, light (3, P), cosines (P,) of its angles and its pixels to other light, and what to say."""
 
 
 def on_panels(
@@ -150,6 +151,8 @@ def on_panels(
     eye: FloatArray,
     change: Change[T],
     threads: int = 1,
+    *,
+    black: bool = False,
 ) -> list[T]:
     """Change the light of facets, in place, by the angle at which an eye (3,) sees each pixel.
 
@@ -161,6 +164,7 @@ def on_panels(
         eye: world metres.
         change: what becomes of pixels that show some light.
         threads: bands of pixels worked on at a time.
+        black: change pixels that show no light too, as far as they are lit.
 
     Returns:
         What `change` said of bands of pixels, in an order that does not depend on the threads.
@@ -172,14 +176,15 @@ def on_panels(
         here = np.s_[y0:y1, x0:x1]
         mine = np.abs(page_of(owners, stage.layout, page)[here]) == facet
         channels = [page_of(buffers[name], stage.layout, page)[here] for name in "RGB"]
-        mine &= (channels[0] != 0) | (channels[1] != 0) | (channels[2] != 0)
+        if not black:
+            mine &= (channels[0] != 0) | (channels[1] != 0) | (channels[2] != 0)
         y, x = np.nonzero(mine)
         if not y.size:
             return []
         light = np.stack([channel[y, x] for channel in channels]).astype(np.float64)
         matrix = inverse_affine(stage.layout.quilt_from_facet[row])
         i, j = matrix @ np.stack((x + (x0 + 0.5), y + (y0 + 0.5), np.ones(y.size)))
-        light, said = change(row, light, cosines(stage.facets, stage.layout, row, (i, j), eye))
+        light, said = change(row, light, cosines(stage.facets, stage.layout, row, (i, j), eye), (i, j))
         for channel, values in zip(channels, light, strict=True):
             channel[y, x] = values
         return [said]

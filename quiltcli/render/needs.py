@@ -20,18 +20,18 @@ MOST_PIXELS = 10**9
 
 
 def demand_memory(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> None:
-    """Raise unless the quilt's buffers fit into the memory that is free.
+    """Raise unless the quilt's buffers fit into the memory that is free, one view at a time.
 
     Args:
         job: says which channels there are.
         layout: says how many pixels.
-        frames: the frames to draw, the job's by default; of two views or more, two are in memory at a time.
+        frames: the frames to draw, the job's by default; of two eyes in one file both are in memory.
 
     Raises:
         JobError: they do not; the sentence says how much is needed and what would need less.
     """
     pixels, free = int(layout.page_offset[-1]), free_memory()
-    sheets = min(_views(job, frames), 2)
+    sheets = min(view_count(job, frames), 2 if job.is_stereo and job.output.stereo == "parts" else 1)
     needed = pixels * (owner_bytes(layout) + sheets * pixel_bytes(job))
     if free is None or needed <= free:
         return
@@ -49,19 +49,22 @@ def pixel_bytes(job: JobFile) -> int:
     return sum(np.dtype(dtype).itemsize for dtype, _ in exr_channels(job.output.channels).values())
 
 
-def _views(job: JobFile, frames: Sequence[int] | None) -> int:
+def view_count(job: JobFile, frames: Sequence[int] | None = None) -> int:
     """How many views are drawn: one a frame, or one a frame and eye."""
     return len(job.frames if frames is None else frames) * (2 if job.is_stereo else 1)
 
 
 def page_warnings(layout: Layout) -> Iterator[str]:
-    """A sentence for pages that few programs take."""
+    """A sentence for pages that few programs take, and for more pixels than displays have."""
     for page, (width, height) in enumerate(layout.pages.tolist(), 1):
-        if max(width, height) > MOST_SIDE or width * height > MOST_PIXELS:
+        if max(width, height) > MOST_SIDE:
             yield (
                 f"page {page} is {width}×{height} pixels: many cards and players take {MOST_SIDE} a side at"
                 " most (layout: size and max_pages make smaller ones)"
             )
+    pixels = int(layout.page_offset[-1])
+    if pixels > MOST_PIXELS:
+        yield f"the pages hold {pixels:,} pixels in all, more than a gigapixel: is the pitch right?"
 
 
 def number_warnings(job: JobFile, frames: Sequence[int] | None = None) -> Iterator[str]:
@@ -83,12 +86,17 @@ def number_warnings(job: JobFile, frames: Sequence[int] | None = None) -> Iterat
         )
 
 
-def disk_warnings(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> Iterator[str]:
-    """A sentence when the images, not compressed, are larger than the disk has room for."""
+def image_bytes(job: JobFile, layout: Layout) -> int:
+    """Bytes of a view's images before compression."""
     pixels = int(layout.page_offset[-1]) * job.output.quilts
     pixels += int(layout.size.astype(np.int64).prod(axis=1)[layout.page >= 0].sum()) * job.output.facets
-    count = _views(job, frames)
-    needed, free = count * pixels * pixel_bytes(job), free_disk(job.output.directory)
+    return pixels * pixel_bytes(job)
+
+
+def disk_warnings(job: JobFile, layout: Layout, frames: Sequence[int] | None = None) -> Iterator[str]:
+    """A sentence when the images, not compressed, are larger than the disk has room for."""
+    count = view_count(job, frames)
+    needed, free = count * image_bytes(job, layout), free_disk(job.output.directory)
     if free is not None and needed > free:
         yield (
             f"the images of {count:,} view{'s' * (count > 1)} hold {bytes_text(needed)} before compression,"
@@ -126,7 +134,6 @@ def _omnistereo_problems(job: JobFile) -> list[Problem]:
         found += [spec.source.problem((), words) for spec in job.people.values()]
     wanted = {
         "method": (how.method, ("homography", "raycast")),
-        "samples": (how.samples, (1,)),
         "shutter": (how.shutter, (0,)),
         "depth_bits": (how.depth_bits, (None,)),
         "backface_culling": (how.backface_culling, (False,)),
@@ -135,7 +142,7 @@ def _omnistereo_problems(job: JobFile) -> list[Problem]:
     for key, (value, allowed) in wanted.items():
         if value not in allowed:
             shown = str(value).lower() if isinstance(value, bool) else value
-            words = f"expected {_shown(allowed)} with omnistereo, which casts a ray a pixel, got {shown}"
+            words = f"expected {_shown(allowed)} with omnistereo, which casts rays, got {shown}"
             found.append(how.source.problem(key, words))
     if "motion" in job.output.channels:
         found.append(job.output.source.problem("channels", "motion is not told with omnistereo"))

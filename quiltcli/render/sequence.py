@@ -29,6 +29,7 @@ from quiltcli.job import JobFile, job_sha256
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.crew import default_threads
 from quiltcli.render.interrupt import stop_between_frames
+from quiltcli.render.memory import estimate_text, less_words, shared_out
 from quiltcli.render.methods import draw_moment
 from quiltcli.render.moments import moment
 from quiltcli.render.notices import stage_warnings
@@ -62,7 +63,8 @@ class RenderOptions:
         folder: output folder instead of the job's.
         resume: skip frames that are complete and made by the same job.
         overwrite: replace images that exist.
-        facets: ids of the only facets to draw, merged into the quilts that exist.
+        facets: ids of the only facets to draw, merged into the quilts that exist, if there are quilts.
+        eye: the only eye to draw, `left` or `right`; None for all.
         threads: batches and files worked on at a time; 0 takes every core.
         dry_run: find every problem, write nothing.
         strict: take what is only worth a second look for a problem.
@@ -73,6 +75,7 @@ class RenderOptions:
     resume: bool = False
     overwrite: bool = False
     facets: Sequence[int] | None = None
+    eye: str | None = None
     threads: int = 0
     dry_run: bool = False
     strict: bool = False
@@ -86,11 +89,13 @@ class Listener:
         begin: the number of frames that will be rendered.
         frame_done: the record of a frame whose files are all written.
         say: a sentence for the user.
+        plan: what the run will take of the machine.
     """
 
     begin: Callable[[int], None] = lambda count: None
     frame_done: Callable[[FrameRecord], None] = lambda record: None
     say: Callable[[str], None] = lambda sentence: None
+    plan: Callable[[str], None] = lambda sentence: None
 
 
 @dataclass(frozen=True)
@@ -134,6 +139,12 @@ def render(
     start = time.perf_counter()
     ready = prepare(job, options)
     say_notices(ready, options, listener)
+    threads = options.threads or default_threads()
+    if ready.views:
+        triangles = len(ready.stage.scene.triangles)
+        listener.plan(
+            estimate_text(ready.stage.job, ready.stage.layout, len(ready.views), triangles, threads)
+        )
     if options.dry_run:
         for notice in unseen_in(ready.stage, ready.views):
             listener.say(notice)
@@ -143,7 +154,7 @@ def render(
         return []
     with failing_run(of_the_disk=True):
         write_settings(ready.stage, ready.out)
-    return render_frames(ready, options.threads or default_threads(), listener, start)
+    return render_frames(ready, threads, listener, start)
 
 
 def say_notices(ready: Prepared, options: RenderOptions, listener: Listener) -> None:
@@ -166,10 +177,10 @@ def prepare(job: JobFile, options: RenderOptions) -> Prepared:
         views_of(job, frames)  # what is wrong with the path is said before anything is loaded
         stage = set_stage(job, options.folder)
         job_sha = job_sha256(job)
-        views = stage.views(frames)
+        views = chosen_views(stage, frames, options.eye)
     only = chosen_facets(stage, options.facets)
     out = outputs(stage, options.folder or job.output.directory, job_sha, options.facets)
-    if only is not None:
+    if only is not None and job.output.quilts:
         raise_all(OutputError, merge_problems(stage, out, views))
     elif options.resume:
         views = unfinished(stage, out, views, options.threads or default_threads())
@@ -190,10 +201,14 @@ def render_frames(
         start: when the run began, by `time.perf_counter`; None for now.
     """
     stage, views = ready.stage, ready.views
+    share = shared_out(stage.job, stage.layout, views, threads)
+    if words := less_words(share, threads, min(len(views), 2)):
+        listener.say(words)
+    threads = share.workers
     pooled = threads > 1 and can_fork() and worth_forking(stage)
     groups = by_file(views)
     most = max(map(len, groups), default=1)
-    sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in views[:2]]
+    sheets = [(shared_buffers if pooled else new_buffers)(stage) for _ in range(share.sheets)]
     # Forked before this process has threads of its own: a lock that one holds would stay locked.
     with ExitStack() as ends:
         ends.enter_context(failing_run())
@@ -209,7 +224,7 @@ def render_frames(
             turns = [(number * most + place) % len(sheets) for place in range(len(group))]
             records, drawn = [], []
             for turn, view in zip(turns, group, strict=True):
-                if ready.only is not None:
+                if ready.only is not None and stage.job.output.quilts:
                     read_quilt(stage, ready.out, view, sheets[turn])
                 now, sheet = moment(stage, view), sheets[turn]
                 records.append(draw_moment(now, sheet, threads, ready.only, dirty=dirty[turn], crew=pool))
@@ -290,6 +305,23 @@ class Writer:
             write_report(out.folder / "report.json", out.job_sha, __version__, records)
             for record in records:
                 self._listener.frame_done(record)
+
+
+def chosen_views(stage: Stage, frames: Sequence[int], eye: str | None) -> list[View]:
+    """The views of frames, or those of an eye.
+
+    Raises:
+        JobError: the job has one eye, or files that both eyes share.
+    """
+    views = stage.views(frames)
+    if eye is None:
+        return views
+    if not stage.job.is_stereo:
+        raise JobError(f"--eye {eye}: the job has one eye (viewer.stereo gives it two)")
+    if stage.job.output.stereo == "parts":
+        words = f"--eye {eye}: both eyes are parts of one file, which is drawn whole"
+        raise JobError(f"{words} (output.stereo: files makes two)")
+    return [view for view in views if view.eye == eye]
 
 
 def chosen_facets(stage: Stage, ids: Sequence[int] | None) -> BoolArray | None:

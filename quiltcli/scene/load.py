@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quiltcli.errors import Problem, SceneError, counted, raise_all
+from quiltcli.errors import MeshError, Problem, SceneError, counted, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import Float32Array
 from quiltcli.scene.bake import Baked, given_opacities, given_turns, given_uv
@@ -147,7 +147,7 @@ def load_objects(spec: SceneFile) -> tuple[SceneObject, ...]:
     for index, item in enumerate(spec.objects):
         try:
             objects.append(load_object(item, assets))
-        except SceneError as error:
+        except (MeshError, SceneError) as error:
             key = error.key if isinstance(error, ObjectError) else "mesh"
             problems += [spec.source.problem(("objects", index, key), str(p)) for p in error.problems]
     raise_all(SceneError, problems)

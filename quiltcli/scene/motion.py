@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quiltcli.errors import Problem, SceneError
+from quiltcli.errors import MeshError, Problem, SceneError
 from quiltcli.scene.environment.sky import sky_of
 from quiltcli.scene.load import lights_in, load_objects, scene_of, wants_lights
 from quiltcli.scene.objects import Brought, SceneObject
@@ -80,7 +80,7 @@ class MovingScene:
     def _brought(self, index: int, frame: float) -> Brought:
         try:
             return self.objects[index].at(frame, self.fps)
-        except SceneError as error:
+        except (MeshError, SceneError) as error:
             key = ("objects", index, "mesh")
             raise SceneError([self.spec.source.problem(key, str(p)) for p in error.problems]) from error
 

@@ -107,3 +107,67 @@ def test_a_table_of_corners_corrects_a_display(tmp_path):
     both = run(tmp_path / "corners.csv", tmp_path / "a.jpg", "--display", MODELS / "cube5.yaml", "-o", out)
     assert both.exit_code == 2
     assert "expected photos, or one table of corners" in both.output
+
+
+def with_a_board(facets, markers, at):
+    """The display with a board of 2 × 2 markers of 1.4 m, 0.4 m apart, as one more facet that faces +Z."""
+    from dataclasses import replace
+
+    from quiltcli.calibration.markers import Marker
+
+    side, pitch = 36, 0.1
+    corner = np.array(at, float)
+    more = {
+        "corners": corner + side * pitch * np.array([(0, -1, 0), (1, -1, 0), (1, 0, 0), (0, 0, 0)]),
+        "origin": corner[None],
+        "du": np.array([(pitch, 0, 0)]),
+        "dv": np.array([(0, -pitch, 0)]),
+        "size": np.array([(side, side)], np.int32),
+        "normal": np.array([(0, 0, 1.0)]),
+        "enabled": np.array([True]),
+        "mirrored": np.array([False]),
+    }
+    both = {name: np.concatenate((getattr(facets, name), value)) for name, value in more.items()}
+    start = np.append(facets.corner_start, facets.corner_start[-1] + 4)
+    large = replace(facets, names=(*facets.names, "board"), corner_start=start, **both)
+    places = [(2, 2), (20, 2), (2, 20), (20, 20)]
+    extra = [Marker(300 + k, facets.count + 1, place, (14, 14)) for k, place in enumerate(places)]
+    return large, replace(markers, markers=(*markers.markers, *extra))
+
+
+def test_a_board_and_a_distance_take_part(taken, tmp_path):
+    """Real photos, in which a printed board hangs under the walls."""
+    import json
+
+    from quiltcli.calibration.markers import place_markers
+
+    facets = shipped("corner_billboard")
+    markers = place_markers(facets, photo=(640, 480))
+    at = (-1.8, 3.8, 1.0)
+    large, all_markers = with_a_board(taken[1], markers, at)
+    middle, extent = facets.corners.mean(axis=0), np.ptp(facets.corners, axis=0).max()
+    towards = facets.normal.sum(axis=0) / np.linalg.norm(facets.normal.sum(axis=0))
+    side = np.cross((0.0, 1.0, 0.0), towards)
+    pictures = []
+    for across, up in ((-0.7, -0.3), (0.7, 0.3), (0, 0.6), (0.5, -0.4)):
+        eye = middle + extent * (1.5 * towards + across * side + up * np.array((0, 1.0, 0)))
+        pose = photos.looking(eye, middle - (0, 1.2, 0), 0.2 * across)
+        pictures.append(photos.photo(large, all_markers, photos.camera(720, 540, 0.75), pose))
+    paths = photos.save(tmp_path, pictures)
+    out, report = tmp_path / "fixed.yaml", tmp_path / "report"
+    words = ("--display", MODELS / "corner_billboard.yaml", "-o", out, "--anchor", 1, "--report", report)
+    wide = float(np.linalg.norm(facets.polygon(0)[1] - facets.polygon(0)[0]))
+    board = "2x2,1.4m,0.4m,5x5,300=1,2"
+    done = run(*paths, *words, "--attached", board, "--distance", f"1A-1B={wide:.6f}m")
+    assert done.exit_code == 0, done.output
+    assert "board 1, in 4 photos: its middle is at" in done.output
+    assert "scaled by 1.000000" in done.output
+    assert "300" not in done.output.partition("left alone")[2]
+    rig = json.loads((report / "rig.json").read_text())["boards"][0]
+    found = np.array(rig["corners"])
+    np.testing.assert_allclose(found[0, 0], np.array(at) + (0.2, -0.2, 0), atol=0.02)
+    np.testing.assert_allclose(found[3, 2], np.array(at) + (3.4, -3.4, 0), atol=0.02)
+    assert rig["facets"] == [1, 2]
+    again = run(*paths, *words, "--overwrite", "--attached", "2x2,1.4m,0.4m,5x5,400")
+    assert again.exit_code == 2
+    assert "no photo shows board 1 (expected markers 400 to 403)" in again.output

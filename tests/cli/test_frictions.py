@@ -44,7 +44,7 @@ def test_the_hint_for_a_package_that_is_missing_can_be_followed() -> None:
 def test_films_give_that_hint(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(MissingExtraError, match=r"pip install -e '\.\[video\]'"):
-        video._av()
+        video.load_av()
 
 
 def test_check_and_simulate_say_what_render_says(job: Path, tmp_path: Path) -> None:

@@ -64,15 +64,27 @@ def test_the_template_is_one_and_runs(job, tmp_path):
     assert facet_path(tmp_path / "out", 1, 4).is_file()
 
 
+def test_the_template_of_eyes_and_facets_is_one(pair, tmp_path):
+    pytest.importorskip("openjd.cli")
+    out = tmp_path / "job.openjd.yaml"
+    quilt("farm", pair, "-o", out, "--by", "eyes", "--by", "facets")
+    openjd = [sys.executable, "-m", "openjd", "check", str(out)]
+    done = subprocess.run(openjd, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_an_outline_of_opencue(job, tmp_path):
     out = tmp_path / "job.outline.py"
     quilt("farm", job, "-o", out, "--command", 'C:\\quilt "new"')
-    calls = [node for node in ast.walk(ast.parse(out.read_text())) if isinstance(node, ast.Call)]
+    tree = ast.parse(out.read_text())
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
     shell = next(call for call in calls if getattr(call.func, "id", "") == "Shell")
-    found = {word.arg: ast.literal_eval(word.value) for word in shell.keywords}
+    found = {word.arg: word.value for word in shell.keywords}
+    (loop,) = (node for node in ast.walk(tree) if isinstance(node, ast.For))
     command = ['C:\\quilt "new"', "render", str(job), "--frames", "#IFRAME#"]
-    assert found["command"] == [*command, "--output", str(tmp_path / "out"), "--resume"]
-    assert found["range"] == "1-4"
+    command += ["--output", str(tmp_path / "out"), "--resume"]
+    assert ast.literal_eval(loop.iter) == [["render", command]]
+    assert ast.literal_eval(found["range"]) == "1-4"
 
 
 def test_a_colon_is_a_step_where_a_farm_means_that(job):
@@ -128,3 +140,69 @@ def test_memory_may_be_limited(job, monkeypatch):
     assert "of memory, but 0.1 MB are free" in said
     assert quilt("render", job, "-f", "1", "--max-memory", "64GB")[0] == 0
     assert "expected a size such as 8GB" in quilt("render", job, "--max-memory", "much")[1]
+
+
+@pytest.fixture
+def pair(job, tmp_path):
+    """A job of two eyes without quilts."""
+    replaced(tmp_path, "job.yaml", "  near: 0.05", "  near: 0.05\n  stereo: {separation: 0.06}")
+    replaced(tmp_path, "job.yaml", "frames: 1-4", "frames: 1-2\noutput: {quilts: false}")
+    return job
+
+
+def test_eyes_and_facets_are_handed_out(pair, tmp_path):
+    out = tmp_path / "job.openjd.yaml"
+    quilt("farm", pair, "-o", out, "--by", "eyes", "--by", "facets", "--set", "fps=24")
+    data = yaml.safe_load(out.read_text())
+    (step,) = data["steps"]
+    space = step["parameterSpace"]["taskParameterDefinitions"]
+    assert [(one["name"], one["type"]) for one in space] == [
+        ("Frame", "CHUNK[INT]"),
+        ("Eye", "STRING"),
+        ("Facet", "INT"),
+    ]
+    assert [one["range"] for one in space[1:]] == [["left", "right"], "1-2"]
+    args = step["script"]["actions"]["onRun"]["args"]
+    assert args[-6:] == ["--set", "fps=24", "--eye", "{{Task.Param.Eye}}", "--facets", "{{Task.Param.Facet}}"]
+    quilt("farm", pair, "-o", tmp_path / "a.outline.py", "--by", "eyes", "--by", "facets")
+    (loop,) = (node for node in ast.walk(ast.parse((tmp_path / "a.outline.py").read_text()))
+               if isinstance(node, ast.For))  # fmt: skip
+    layers = dict(ast.literal_eval(loop.iter))
+    sides = [(eye, name) for eye in ("left", "right") for name in ("back", "right")]
+    assert list(layers) == [f"render_{eye}_{name}" for eye, name in sides]
+    assert layers["render_right_back"][-4:] == ["--eye", "right", "--facets", "1"]
+
+
+def test_what_shares_a_file_is_not_handed_out_apart(job, pair, tmp_path):
+    """The first is a job of two eyes without quilts as well."""
+    for words, sets in (
+        ("--by facets: the pages of a quilt hold facets together", "output.quilts=true"),
+        ("--by eyes: both eyes are parts of one file", "output.stereo=parts"),
+        ("--by eyes: the job has one eye", "viewer.stereo=null"),
+    ):
+        by = words.split()[1].rstrip(":")
+        code, said = quilt("farm", pair, "-o", tmp_path / "x.openjd.yaml", "--by", by, "--set", sets)
+        assert (code, words in said) == (2, True), said
+    code, said = quilt("render", pair, "--eye", "left", "--set", "output.stereo=parts")
+    assert (code, "both eyes are parts of one file, which is drawn whole" in said) == (2, True), said
+    code, said = quilt("render", pair, "--eye", "left", "--set", "viewer.stereo=null")
+    assert (code, "--eye left: the job has one eye" in said) == (2, True), said
+
+
+def test_tasks_of_eyes_and_facets_make_what_one_run_makes(pair, tmp_path):
+    assert quilt("render", pair, "-o", tmp_path / "whole")[0] == 0
+    for eye in ("right", "left"):
+        for facet in ("2", "back"):
+            words = ("render", pair, "-o", tmp_path / "parts", "--eye", eye, "--facets", facet, "--resume")
+            code, said = quilt(*words)
+            assert code == 0, said
+            assert quilt(*words)[1].endswith("complete already\n")
+    names = [f"facet_000{facet}.{eye}.000{frame}.exr" for facet in (1, 2) for eye in ("left", "right")
+             for frame in (1, 2)]  # fmt: skip
+    for name in names:
+        one, other = (tmp_path / folder / "facets" / name for folder in ("whole", "parts"))
+        assert one.read_bytes() == other.read_bytes()
+    assert sorted(path.name for path in (tmp_path / "parts/facets").iterdir()) == sorted(names)
+    whole = quilt("render", pair, "-o", tmp_path / "parts", "--resume")
+    assert whole[1].endswith("complete already\n")
+    assert quilt("render", pair, "-o", tmp_path / "parts", "--facets", "2")[0] == 2

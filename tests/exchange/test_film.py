@@ -92,6 +92,7 @@ FILMS = [
     ("a.mp4", None, "h264", "avc1"),
     ("a.mp4", "h265", "hevc", "hvc1"),
     ("a.mov", "hap", "hap", "Hap1"),
+    ("a.mov", "dxv", "dxv", "DXD3"),
 ]
 
 
@@ -119,6 +120,14 @@ def test_dnxhr_needs_pictures_of_some_size(out, tmp_path):
     make_film(tmp_path / "big", tmp_path / "a.mov", FilmOptions(codec="dnxhr"))
     with av.open(str(tmp_path / "a.mov")) as container:
         assert container.streams.video[0].codec_context.name == "dnxhd"
+
+
+def test_dxv_takes_sizes_in_sixteens(tmp_path):
+    pytest.importorskip("av")
+    put(tmp_path / "o/quilt/page_01.0001.exr", np.full((68, 128, 3), 0.5))
+    with pytest.raises(OutputError, match=r"in multiples of 16, and this is 128×68 pixels"):
+        make_film(tmp_path / "o", tmp_path / "a.mov", FilmOptions(codec="dxv"))
+    assert not (tmp_path / "a.mov").exists()
 
 
 def test_a_facet_that_was_left_out_is_black_and_told(out, tmp_path):

@@ -25,6 +25,7 @@ BARE = {
     *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),
     *("uv_set", "offset", "strength", "quilt_camera", "distortion"),
     *("exponent", "limit", "level", "peak", "gain", "gamma", "white", "signal_gamma"),
+    *("throw", "shift", "matrix", "black", "weights_gamma"),
 }
 
 

@@ -22,6 +22,7 @@ EYES = {
     "dome": [(0.0, 1.7, 0.0), (3.0, 2.5, 1.0)],
     "paraboloid": [(0.4, 1.5, 0.6), (1.6, 2.2, -1.0), (1.5, 1.0 + 0.5 * 0.9, 0.2)],
     "bezier_panel": [(0.2, 1.5, 2.6), (-1.9, 1.2, 1.1)],
+    "projected_sphere": [(1.5, 1.7, 2.4), (0.3, 3.0, 0.8)],
     "panorama160": [(0.1, 1.6, 0.2), (0.7, 1.2, -0.5)],
 }
 
@@ -30,6 +31,7 @@ EYES = {
 def test_a_model_is_within_tolerance(name: str, eye: tuple[float, float, float], tmp_path: Path) -> None:
     text = (FOLDER / f"{name}.yaml").read_text().partition("quilt_display: 1\n")[2]
     pixels = [int(side) // 16 for side in re.findall(r"pixels: \[(\d+), (\d+)\]", text)[0]]
+    text = text.replace("screen: ", f"screen: {FOLDER}/")
     text = re.sub(r"pixels: \[\d+, \d+\]", f"pixels: {pixels}", text)
     vertices, faces = boxes(60, 0.8, 4.0)
     job = curved_job(tmp_path, text, (vertices, faces), eye, (0.01, 1, 0))

@@ -95,7 +95,7 @@ def test_rays_from_elsewhere_are_found_out(tmp_path: Path) -> None:
     ("tail", "words"),
     [
         ("output: {channels: [rgba]}\n", "the job has one eye (expected stereo)"),
-        (STEREO + "render: {samples: 4}\n", "samples: expected 1 with omnistereo"),
+        (STEREO + "render: {shutter: 0.5, samples: 4}\n", "shutter: expected 0 with omnistereo"),
         (STEREO + "render: {method: cubemap}\n", "method: expected homography or raycast with omnistereo"),
         (STEREO + "render: {backface_culling: true}\n", "backface_culling: expected false with omnistereo"),
     ],
@@ -118,3 +118,19 @@ def test_keys_that_make_no_sense_are_said(keys: str, words: str, tmp_path: Path)
     with pytest.raises(QuiltError) as error:
         projection_of(f"kind: equirect, {keys}", tmp_path)
     assert words in str(error.value)
+
+
+def test_samples_are_means_of_rays_from_eyes_of_their_own(tmp_path: Path) -> None:
+    tail = STEREO + "render: {samples: 16}\n"
+    stage = set_stage(room_job(tmp_path, tail=tail))
+    buffers = new_buffers(stage)
+    draw_view(stage, stage.views([1])[1], buffers)
+    one = set_stage(room_job(tmp_path))
+    sharp = new_buffers(one)
+    draw_view(one, one.views([1])[1], sharp)
+    # Depth is the centre's; light is that of one sample but at edges, and there is light everywhere.
+    assert (buffers["Z"] == sharp["Z"]).all()
+    assert (buffers["A"] == 1).all()
+    away = np.abs(buffers["R"].astype(np.float64) - sharp["R"])
+    assert np.median(away) < 1e-3
+    assert away.max() > 0.01

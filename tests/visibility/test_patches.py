@@ -48,7 +48,8 @@ def counts(stage: Stage, viewer: Viewer) -> tuple[np.ndarray, np.ndarray]:
     for k in range(pairs.triangle.size):
         place = int(planes.block[k])
         tiles = slice(int(canvas.tile_start[place]), int(canvas.tile_start[place + 1]))
-        values = np.einsum("ec,tcp->etp", planes.edge[:, :, k], samples.points[tiles])
+        slopes, constant = planes.edge[:, :2, k], planes.edge[:, 2, k]
+        values = np.einsum("ec,tcp->etp", slopes, samples.points[tiles]) + constant[:, None, None]
         assert (values != 0).all()
         found[tiles] += (values > 0).all(axis=0)
     return found, samples.lit

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from quiltcli.analysis.info.record import Info
 from quiltcli.formats.inputs import name_fault
-from quiltcli.formats.mesh.read import SUFFIXES
 from quiltcli.job import file_kind
+from quiltcli.job.model import MESHES
 
 __all__ = ["Info", "describe"]
 
@@ -28,7 +28,7 @@ def describe(path: Path | str) -> Info:
         from quiltcli.analysis.info.images import image_info
 
         return image_info(path)
-    if suffix in SUFFIXES:
+    if suffix in MESHES:
         from quiltcli.analysis.info.scenes import mesh_info
 
         return mesh_info(path)

@@ -12,6 +12,7 @@ import numpy as np
 from quiltcli.analysis.info.record import Info, bounds, bounds_text, counted, number, size, spread
 from quiltcli.charts.measure import measure
 from quiltcli.display import Facets, load_display, pitch_mm, pitch_of, shared_edges
+from quiltcli.display.projectors import projector_facets, screened
 from quiltcli.formats.mesh.polygons import area_vectors
 from quiltcli.geometry import FloatArray, IntArray, dot, segments
 from quiltcli.job import DisplayFile
@@ -45,12 +46,21 @@ def display_info(path: Path) -> Info:
         ("pixels", f"{data['pixels']:,}"),
         *([] if spec.projection else [("pitch", spread(low, high, "mm"))]),
         ("bounds", bounds_text(data["bounds"])),
-        *(_surface_line(found) for found in data.get("surfaces", ())),
+        *_surface_lines(spec, data),
         ("shared edges", f"{data['shared_edges']:,}"),
         ("geometry", facets.sha256),
     ]
     columns = ("facet", "name", "corners", "pixels", "area m²", "pitch mm", "normal", "")
     return Info("display", data, lines, columns, [_row(entry) for entry in table])
+
+
+def _surface_lines(spec: DisplayFile, data: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Curved facets in words, projectors by where they stand."""
+    if spec.projectors is None:
+        yield from (_surface_line(found) for found in data.get("surfaces", ()))
+        return
+    for facet, projector in enumerate(projector_facets(spec, load_display)[1], 1):
+        yield f"facet {facet}", f"projector {screened(projector)}"
 
 
 def _surface_line(found: dict[str, Any]) -> tuple[str, str]:
@@ -72,6 +82,10 @@ def _sources(spec: DisplayFile) -> Iterator[tuple[str, str]]:
         yield "points", str(spec.points.file)
     if spec.surfaces is not None:
         yield "surfaces", ", ".join(surface.kind for surface in spec.surfaces)
+    if spec.projectors is not None:
+        yield "projectors", f"{len(spec.projectors)}"
+    if spec.screen is not None:
+        yield "screen", str(spec.screen)
     if spec.projection is not None:
         projection = spec.projection
         yield "projection", f"{projection.kind}, which follows the {projection.follows}"

@@ -15,12 +15,12 @@ import numpy as np
 from quiltcli.analysis.simulate.compare import Comparison, compare, figures, heat_map, heat_scale, seam_pixels
 from quiltcli.analysis.simulate.images import shown_images
 from quiltcli.analysis.simulate.lookup import Shown
+from quiltcli.analysis.simulate.overlaps import all_light
 from quiltcli.analysis.simulate.picture import (
     direct_light,
-    displayed_light,
+    first_triangles,
     outlined,
     seen_from,
-    visible_triangles,
     with_channels,
 )
 from quiltcli.analysis.simulate.reference import resampled_light
@@ -36,6 +36,7 @@ from quiltcli.render.crew import default_threads
 from quiltcli.render.notices import stage_warnings
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.render.unseen import unseen_in
+from quiltcli.scene.bare import bare_scene
 from quiltcli.viewer.view import views_of
 from quiltcli.viewer.viewer import Viewer
 
@@ -158,10 +159,13 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     width, height = (options.samples * side for side in options.size)
     through = camera_display(camera, width, height, fov)
     threads = options.threads or default_threads()
-    triangle = visible_triangles(stage, camera, through, threads, skin)
+    bare = bare_scene(skin.vertices, skin.triangles)
+    triangle, depth = first_triangles(stage, camera, through, bare, threads)
     facet = skin.facet_of(triangle)
     seen = seen_from(stage, shown, camera.eye, threads)
-    light, lit = displayed_light(seen, camera, through, facet, options.filter, skin, triangle)
+    light, lit = all_light(
+        stage, seen, camera, through, facet, options.filter, skin, triangle, depth, threads
+    )
     picture = plain = block_means(_image(light, width), options.samples)
     if options.edges:
         picture = block_means(_image(outlined(light, facet, width), width), options.samples)

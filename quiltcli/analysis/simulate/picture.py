@@ -138,12 +138,13 @@ def seen_from(stage: Stage, shown: Shown, eye: FloatArray, threads: int) -> Show
     if response is None:
         return shown
 
-    def change(row: int, image: FloatArray, cosine: FloatArray) -> tuple[FloatArray, None]:
+    def change(row: int, image: FloatArray, cosine: FloatArray, _: object) -> tuple[FloatArray, None]:
         return response.shown(row, image, cosine), None
 
     buffers = {name: shown.buffers[name].astype(np.float32) for name in "RGB"}
     rows = np.flatnonzero(shown.lit).tolist()
-    on_panels(stage, shown.owners, rows, buffers, eye, change, threads)
+    leaks = response.blend is not None and response.blend.black > 0
+    on_panels(stage, shown.owners, rows, buffers, eye, change, threads, black=leaks)
     return replace(shown, buffers=buffers)
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from quiltcli.analysis.simulate.lookup import Shown
+from quiltcli.analysis.simulate.overlaps import all_light
 from quiltcli.analysis.simulate.picture import (
     Camera,
     camera_stage,
@@ -209,7 +210,9 @@ def third_person_light(
         np.where((met < 0) | (marked >= 0), len(facet_of), met)
     ]
     front = np.append(np.flatnonzero(~back), -1)[np.where(facet >= 0, met, -1)]
-    light, _ = displayed_light(shown, camera, through, facet, how, skin, front.astype(np.int32))
+    light, _ = all_light(
+        stage, shown, camera, through, facet, how, skin, front.astype(np.int32), depth, threads
+    )
     on = np.flatnonzero(marked >= 0)
     light[:, on] = _mark_light(marks, marked[on], picture_rays(camera, through, on))
     if rear.size:

@@ -17,7 +17,13 @@ _HEAD = "# Facets where they were measured; metres, Y up.\n"
 
 
 def moved_display(
-    spec: DisplayFile, facets: Facets, turns: FloatArray, middles: FloatArray, shifts: FloatArray, mesh: str
+    spec: DisplayFile,
+    facets: Facets,
+    turns: FloatArray,
+    middles: FloatArray,
+    shifts: FloatArray,
+    mesh: str,
+    scale: float = 1.0,
 ) -> dict[str, str]:
     """Texts of the display whose facets have moved rigidly: turned about their middles, then shifted.
 
@@ -28,6 +34,7 @@ def moved_display(
         middles: (F, 3) what facets turn about, world metres.
         shifts: (F, 3) metres.
         mesh: name of the mesh file, where the display has one.
+        scale: how many times as large as the file says the facets are.
 
     Returns:
         Text of the display file under an empty name, and of the mesh under its own.
@@ -36,11 +43,12 @@ def moved_display(
     corners = _carried(turns[row], facets.corners - middles[row]) + (middles + shifts)[row]
     up = _carried(turns, -normalized(facets.dv))
     if spec.panels is None:
-        return mesh_display(spec, facets, corners, up, mesh)
+        return mesh_display(spec, facets, corners, up, mesh, scale)
     facing = _carried(turns, facets.normal)
     middle = _carried(turns, _panel_middles(facets) - middles) + middles + shifts
     panels = [
-        _panel(spec, facets, k, panel, middle[k], facing[k], up[k]) for k, panel in enumerate(spec.panels)
+        _panel(spec, facets, k, panel, middle[k], facing[k], up[k], scaled=scale != 1)
+        for k, panel in enumerate(spec.panels)
     ]
     data: dict[str, Any] = {"quilt_display": 1, "panels": panels, "viewing_side": spec.viewing_side}
     if spec.corrections is not None:
@@ -49,9 +57,17 @@ def moved_display(
 
 
 def mesh_display(
-    spec: DisplayFile, facets: Facets, corners: FloatArray, up: FloatArray, mesh: str
+    spec: DisplayFile,
+    facets: Facets,
+    corners: FloatArray,
+    up: FloatArray,
+    mesh: str,
+    scale: float = 1.0,
 ) -> dict[str, str]:
-    """Texts of a display of these polygons (C, 3), whose images have these directions (F, 3) up."""
+    """Texts of a display of these polygons (C, 3), whose images have these directions (F, 3) up.
+
+    They are so many times as large as the file says, and have as many pixels as there.
+    """
     lines = [f"v {' '.join(f'{value:.12g}' for value in corner)}" for corner in corners.tolist()]
     if facets.uv is not None:
         lines += [f"vt {u!r} {v!r}" for u, v in facets.uv.tolist()]
@@ -73,6 +89,8 @@ def mesh_display(
     data: dict[str, Any] = {"quilt_display": 1, "mesh": mesh, "viewing_side": spec.viewing_side}
     if spec.resolution is not None:
         data["resolution"] = plain(spec.resolution, str)
+        if scale != 1 and spec.resolution.density is not None:
+            data["resolution"] = {"pixels_per_metre": spec.resolution.density / scale}
     data["facets"] = each
     if spec.corrections is not None:
         data["corrections"] = plain(spec.corrections, str)
@@ -106,11 +124,13 @@ def _panel(
     middle: FloatArray,
     facing: FloatArray,
     up: FloatArray,
+    *,
+    scaled: bool,
 ) -> dict[str, Any]:
     """A panel's entry: what it was, elsewhere."""
     kept = plain(panel, str)
     entry = {name: kept[name] for name in ("name", "pixels") if kept[name]}
-    if spec.transform is None and spec.metres == 1 and panel.pitch is not None:
+    if spec.transform is None and spec.metres == 1 and panel.pitch is not None and not scaled:
         entry["pitch"] = kept["pitch"]
     else:
         width, height = facets.size[row]

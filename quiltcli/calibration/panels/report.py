@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from quiltcli.calibration.panels.attached import write_rig
 from quiltcli.calibration.panels.camera import write_camera
 from quiltcli.calibration.panels.solve import Solution
 from quiltcli.display import Facets
@@ -56,6 +57,13 @@ def summary(solution: Solution) -> Iterator[str]:
         f"camera: focal length {focal[0]:.1f}{how} px, middle {middle[0]:.1f}, {middle[1]:.1f} px, "
         f"distortion {', '.join(f'{value:.4f}' for value in camera.distortion)}"
     )
+    for number, found in enumerate(solution.boards, 1):
+        x, y, z = found.places.mean(axis=(0, 1))
+        sure = 2000 * float(np.linalg.norm(found.deviation))
+        yield (
+            f"board {number}, in {found.photos} photos: its middle is at {x:.4f}, {y:.4f}, {z:.4f} m "
+            f"± {sure:.2f} mm"
+        )
     if solution.strangers:
         shown = ", ".join(map(str, solution.strangers[:8]))
         yield f"markers that are not on this display were seen and left alone: {shown}"
@@ -99,6 +107,10 @@ def write_report(folder: Path, solution: Solution, facets: Facets, photos: Seque
     write_text(written[0], _residuals(solution))
     write_camera(written[1], solution.camera)
     write_text(written[2], "\n".join((*table(solution, facets), *summary(solution))) + "\n")
+    if solution.boards:
+        written.append(folder / "rig.json")
+        boards = solution.boards
+        write_rig(written[-1], [one.board for one in boards], [one.places for one in boards])
     for number, path in enumerate(photos):
         picture = folder / f"{path.stem}.residuals.png"
         _over_photo(picture, path, solution, number)
@@ -114,7 +126,7 @@ def _residuals(solution: Solution) -> str:
     corners, adjusted = solution.corners, solution.adjusted
     for k in range(len(corners.photo)):
         (x, y), (dx, dy) = corners.pixel[k], adjusted.residual[k]
-        name, facet = solution.photos[corners.photo[k]], solution.facets[corners.facet[k]]
+        name, facet = solution.photos[corners.photo[k]], solution.body(int(corners.facet[k]))
         figures = [f"{value:.4f}" for value in (x, y, dx, dy)]
         rows.writerow((name, int(solution.marker[k]), facet, k % 4 + 1, *figures, int(adjusted.used[k])))
     return out.getvalue()

@@ -38,15 +38,20 @@ class Sightings:
 
 
 def find_markers(paths: Sequence[Path], markers: MarkerSet) -> Sightings:
-    """Look for a display's markers in photos.
+    """Look for a display's markers in photos; errors as for `find_ids`."""
+    return find_ids(paths, markers.dictionary, [marker.id for marker in markers.markers])
+
+
+def find_ids(paths: Sequence[Path], name: str, ids_wanted: Sequence[int]) -> Sightings:
+    """Look for some markers of a dictionary in photos; a sighting's marker is its row among these.
 
     Raises:
         JobError: photos that cannot be read or are of different sizes, a marker that is in one twice.
         MissingExtraError: OpenCV is not installed.
     """
     cv2 = open_cv()
-    detector = _detector(cv2, dictionary(markers.dictionary).words)
-    row_of = {marker.id: row for row, marker in enumerate(markers.markers)}
+    detector = _detector(cv2, dictionary(name).words)
+    row_of = {wanted: row for row, wanted in enumerate(ids_wanted)}
     size: tuple[int, int] | None = None
     photo, marker, pixels, strangers = [], [], [], set()
     problems: list[Problem] = []
@@ -66,12 +71,12 @@ def find_markers(paths: Sequence[Path], markers: MarkerSet) -> Sightings:
         found, ids, _ = detector.detectMarkers(image)
         ids = [] if ids is None else ids.reshape(-1).tolist()
         problems += _twice(ids, path)
-        for corners, name in zip(found, ids, strict=True):
-            if name not in row_of:
-                strangers.add(name)
+        for corners, marked in zip(found, ids, strict=True):
+            if marked not in row_of:
+                strangers.add(marked)
                 continue
             photo.append(number)
-            marker.append(row_of[name])
+            marker.append(row_of[marked])
             pixels.append(corners.reshape(4, 2).astype(float))
     raise_all(JobError, problems)
     assert size is not None

@@ -21,18 +21,18 @@ _FEWEST_VIEWS = 4
 """Views of single facets that a camera of which nothing is known needs."""
 
 
-def unconnected(corners: Corners, ids: Sequence[int], photos: int, anchor: int) -> Iterator[Problem]:
+def unconnected(corners: Corners, names: Sequence[str], photos: int, anchor: int) -> Iterator[Problem]:
     """Facets that no chain of photos leads to from the anchor."""
     # Facets of one photo are one group; groups that share a facet are one as well.
-    group = np.arange(len(ids))
+    group = np.arange(len(names))
     for number in range(photos):
         here = np.unique(group[np.unique(corners.facet[corners.photo == number])])
         if here.size:
             group[np.isin(group, here)] = here[0]
-    lost = [str(ids[k]) for k in np.flatnonzero(group != group[anchor]).tolist()]
+    lost = [names[k] for k in np.flatnonzero(group != group[anchor]).tolist()]
     if lost:
         yield Problem(
-            f"no photo shows facets {', '.join(lost)} together with facet {ids[anchor]}, or with a facet "
+            f"no photo shows facets {', '.join(lost)} together with facet {names[anchor]}, or with a facet "
             "that is tied to it (expected photos that show two neighbours at once, all the way round)"
         )
 
@@ -84,15 +84,21 @@ def first_bundle(
     photos: Sequence[str],
     *,
     free: bool,
+    otherwise: Sequence[int] = (),
 ) -> Bundle:
     """Where the search begins: the display as it should be, and each photo's pose.
+
+    Photos that show something else, `otherwise`, need show no facet; their poses are zero then.
 
     Raises:
         JobError: photos in which nothing was found.
     """
-    empty = [name for k, name in enumerate(photos) if not (corners.photo == k).any()]
+    shows = np.isin(np.arange(len(photos)), corners.photo)
+    empty = [name for k, name in enumerate(photos) if not shows[k] and k not in otherwise]
     raise_all(JobError, [Problem("no marker of the display was found in it", file=name) for name in empty])
-    poses = np.array([_pose(camera, corners.kept(corners.photo == k), frames) for k in range(len(photos))])
+    poses = np.zeros((len(photos), 6))
+    for k in np.flatnonzero(shows).tolist():
+        poses[k] = _pose(camera, corners.kept(corners.photo == k), frames)
     return Bundle(camera, poses, np.zeros((len(middles), 6)), middles, anchor, free)
 
 
@@ -111,14 +117,14 @@ def _pose(camera: Camera, here: Corners, frames: FloatArray) -> FloatArray:
             # From the world to the facet's plane, then before the lens.
             turn, _ = cv2.Rodrigues(vector)
             rotation, translation = turn @ axes, turn @ shift + move[:, 0]
-            error = _miss(camera, here, rotation, translation)
+            error = miss(camera, here, rotation, translation)
             if error < least:
                 least = error
                 best = np.concatenate((cv2.Rodrigues(rotation)[0][:, 0], translation))
     return best
 
 
-def _miss(camera: Camera, here: Corners, rotation: FloatArray, translation: FloatArray) -> float:
+def miss(camera: Camera, here: Corners, rotation: FloatArray, translation: FloatArray) -> float:
     """How badly a pose explains a photo: errors in pixels, of which none counts more than a few hundred."""
     seen = here.world @ rotation.T + translation
     away = np.abs(project(camera, seen) - here.pixel).sum(axis=1)

@@ -67,7 +67,11 @@ if cameras:
     settle(scene, DATA["tracks"][0], cameras[0])
 words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
 if words[:1] == ["--render"] and len(words) == 2:
-    scene.render.image_settings.file_format = "OPEN_EXR"
+    settings = scene.render.image_settings
+    if "OPEN_EXR" not in settings.file_format:
+        if hasattr(settings, "media_type"):  # from Blender 5 on
+            settings.media_type = "IMAGE"
+        settings.file_format = "OPEN_EXR"
     for track, camera in zip(DATA["tracks"], cameras):
         settle(scene, track, camera)
         for key in track["keys"]:

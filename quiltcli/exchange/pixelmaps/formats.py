@@ -13,6 +13,7 @@ from quiltcli.exchange.pixelmaps.mpcdiread import read_mpcdi
 from quiltcli.exchange.pixelmaps.mpcdiwrite import write_mpcdi, write_mpcdi_1
 from quiltcli.exchange.pixelmaps.objmap import read_obj_map, write_obj_map
 from quiltcli.exchange.pixelmaps.panels import read_panels, write_panels
+from quiltcli.exchange.pixelmaps.resolume import read_resolume, write_resolume
 from quiltcli.exchange.pixelmaps.stmap import write_st_maps
 from quiltcli.exchange.pixelmaps.template import write_png_template, write_svg_template
 from quiltcli.formats.inputs import is_regular
@@ -47,6 +48,7 @@ FORMATS: dict[str, Format] = {
     "json": Format(".json", "everything a layout says", write_json, read_json),
     "mpcdi": Format(".mpcdi", "MPCDI 2.0 archive, 2D media profile", write_mpcdi, read_mpcdi),
     "mpcdi1": Format(".mpcdi", "MPCDI 1 archive, 2D media profile", write_mpcdi_1, read_mpcdi),
+    "resolume": Format(".xml", "Resolume's Advanced Output, one file a page", write_resolume, read_resolume),
     "st": Format(".exr", "ST maps of pages and facets", write_st_maps),
     "png": Format(".png", "template picture at exact pixels, one file a page", write_png_template),
     "svg": Format(".svg", "template drawing, one file a page", write_svg_template),

@@ -20,6 +20,7 @@ import numpy as np
 from quiltcli.errors import LayoutError, Problem
 from quiltcli.exchange.pixelmaps.mpcdiwrite import XML
 from quiltcli.exchange.pixelmaps.placing import entries
+from quiltcli.exchange.pixelmaps.xmltext import parsed_xml
 from quiltcli.formats.inputs import is_regular, name_fault, open_input
 from quiltcli.formats.yaml.source import shorten
 from quiltcli.geometry import FloatArray
@@ -114,16 +115,7 @@ class Region:
 def parsed_root(archive: Archive) -> ElementTree.Element:
     """The root of mpcdi.xml, of any profile (LayoutError)."""
     text = archive.read(XML, _XML_BYTES)
-    try:
-        root = ElementTree.fromstring(text)
-    except (LookupError, ValueError):
-        raise LayoutError(Problem(f"{XML} is in an unknown encoding", file=str(archive.path))) from None
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        words = str(error).partition(":")[0]
-        raise LayoutError(
-            Problem(f"{XML} is not XML: {words}", str(archive.path), line, column + 1)
-        ) from None
+    root = parsed_xml(text, XML, archive.path)
     if root.tag.lower() != "mpcdi":
         raise LayoutError(Problem(f"{XML} holds <{root.tag}>, expected <MPCDI>", file=str(archive.path)))
     return root

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from quiltcli.errors import JobError, OutputError, Problem
+from quiltcli.exchange.project.cameras import Asked, Found, read_camera
 from quiltcli.exchange.project.lenses import (
     FACES,
     Cube,
@@ -23,9 +20,9 @@ from quiltcli.exchange.project.lenses import (
     viewer_axes,
 )
 from quiltcli.exchange.project.texels import Texels, texels
-from quiltcli.formats.inputs import read_input
+from quiltcli.formats.films import FILMS, film_picture
 from quiltcli.formats.pictures import read_picture
-from quiltcli.geometry import Float32Array, FloatArray
+from quiltcli.geometry import Float32Array
 from quiltcli.job.sequence import is_pattern, numbered
 from quiltcli.viewer.view import View
 
@@ -46,26 +43,30 @@ class Master:
     """A picture, or one a frame.
 
     Attributes:
-        path: the file; # stands for the frame number, and {face} for a name of `FACES`.
+        path: the file, a picture or a film; # stands for the frame number, and {face} for a name of `FACES`.
         kind: a name of `KINDS`.
         fov: of a pinhole without a camera, degrees across.
-        camera: JSON file with a pinhole's camera.
+        camera: file with a pinhole's camera: JSON, glTF or USD.
+        camera_name: which of the file's cameras, where it has several.
         yaw: of a panorama, cube or fisheye: which way its front looks from −Z, degrees to the left.
         aperture: of a fisheye's circle, degrees.
         tilt: of a fisheye's middle, from straight up towards its front, degrees.
         stereo: a name of `STEREO` where both eyes' pictures are halves of one, left or top first; or empty.
         colorspace: as for `read_picture`.
+        fps: frames a second of the job, by which frames are moments of a film or a camera's file.
     """
 
     path: Path
     kind: str
     fov: float | None = None
     camera: Path | None = None
+    camera_name: str = ""
     yaw: float = 0.0
     aperture: float = 180.0
     tilt: float = 0.0
     stereo: str = ""
     colorspace: str = "auto"
+    fps: float = 24.0
 
     def check(self) -> None:
         """Raise JobError where what is said does not go together."""
@@ -73,6 +74,8 @@ class Master:
             raise JobError("a pinhole needs its angle or its camera (expected --fov-deg or --camera)")
         if self.kind != "pinhole" and (self.fov is not None or self.camera is not None):
             raise JobError(f"--fov-deg and --camera are a pinhole's, not of --as {self.kind}")
+        if self.camera_name and self.camera is None:
+            raise JobError("--camera-name names a camera of a file (expected --camera)")
         if self.fov is not None and not 0 < self.fov < 180:
             raise JobError(f"--fov-deg must be between 0 and 180, got {self.fov:g}")
         if not 0 < self.aperture <= 360:
@@ -87,14 +90,20 @@ class Master:
             return (path,)
         return tuple(path.with_name(path.name.replace(_FACE, face)) for face in FACES)
 
+    @property
+    def is_film(self) -> bool:
+        """Whether frames are pictures of one file."""
+        return self.path.suffix.lower() in FILMS
+
     def pictures(self, frame: int, eye: str) -> list[Float32Array]:
         """What is shown in a frame for an eye: one picture (H, W, 4), or six.
 
         Raises:
             OutputError: a file cannot be read, or has no shape that the kind of picture has.
         """
-        found = [_half(read_picture(path, self.colorspace), self.stereo, eye) for path in self.files(frame)]
-        path = self.files(frame)[0]
+        files = self.files(frame)
+        found = [_half(self._read(path, frame), self.stereo, eye) for path in files]
+        path = files[0]
         if self.kind != "cubemap":
             return found
         faces = found if len(found) > 1 else _unfolded(found[0], path)
@@ -102,6 +111,17 @@ class Master:
         if len(shapes) > 1 or len({*shapes.pop()[:2]}) > 1:
             raise OutputError(Problem("a cube's faces must be square and of one size", file=str(path)))
         return faces
+
+    def _read(self, path: Path, frame: int) -> Float32Array:
+        if self.is_film:
+            return film_picture(path, (frame - 1) / self.fps, self.colorspace)
+        return read_picture(path, self.colorspace)
+
+    def camera_of(self, view: View, size: tuple[int, int]) -> Found | None:
+        """The camera of a view, where there is a file of it."""
+        if self.camera is None:
+            return None
+        return read_camera(Asked(self.camera, self.camera_name, view, self.fps, size))
 
     def lens(self, view: View, size: tuple[int, int]) -> Lens:
         """How a picture of this size shows directions from the eye of a view."""
@@ -113,8 +133,8 @@ class Master:
         if self.kind == "fisheye":
             pitch = math.radians(90 - self.tilt)
             return Fisheye(axes_of(math.radians(self.yaw), pitch), math.radians(self.aperture), size)
-        if self.camera is not None:
-            return _camera(self.camera, view, size)
+        if (found := self.camera_of(view, size)) is not None:
+            return found.lens
         half = math.tan(math.radians(self.fov or 0) / 2)
         high = half * size[1] / size[0]
         return Pinhole(viewer_axes(view.viewer.look, view.viewer.up), (-half, half, -high, high), size)
@@ -153,37 +173,3 @@ def _unfolded(light: Float32Array, path: Path) -> list[Float32Array]:
         return faces
     wrong = f"is {width}×{height} pixels, which is no cross of 4×3 or 3×4 faces and no row or column of 6"
     raise OutputError(Problem(wrong, file=str(path)))
-
-
-def _camera(path: Path, view: View, size: tuple[int, int]) -> Pinhole:
-    """A camera of JSON: one of `quilt cameras`, or its record alone.
-
-    Raises:
-        JobError: there is no camera of the frame, or several, or it is none.
-    """
-    try:
-        data: Any = json.loads(read_input(path, JobError, "a camera"))
-        record = _record(data, view)
-        axes: FloatArray = np.array([record[key] for key in ("right", "up", "forward")], dtype=np.float64)
-        left, right, bottom, top = (float(record["window"][k]) for k in ("left", "right", "bottom", "top"))
-    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
-        if isinstance(error, JobError):
-            raise
-        words = "is no camera (expected right, up, forward and window, as quilt cameras writes them)"
-        raise JobError(Problem(words, file=str(path))) from None
-    good = axes.shape == (3, 3) and bool(np.abs(axes @ axes.T - np.eye(3)).max() < 1e-6)
-    if not (good and left < right and bottom < top):
-        words = "is no camera: its axes must be perpendicular and of length 1, its window not empty"
-        raise JobError(Problem(words, file=str(path)))
-    return Pinhole(axes, (left, right, bottom, top), size)
-
-
-def _record(data: Any, view: View) -> Any:
-    if "frames" not in data:
-        return data
-    frames = data["frames"]
-    mine = [shot for shot in frames if shot["frame"] == view.frame and shot["eye"] in (view.eye, "center")]
-    cameras = (mine or (frames if len(frames) == 1 else []) or [{"cameras": []}])[0]["cameras"]
-    if len(cameras) != 1:
-        raise JobError(f"--camera has {len(cameras)} cameras of frame {view.name}, expected one")
-    return cameras[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -19,6 +19,7 @@ from quiltcli.exchange.project.sights import Rays, facet_rays, shown_pixels
 from quiltcli.exchange.project.stmap import write_st_maps
 from quiltcli.exchange.project.texels import Texels
 from quiltcli.exchange.project.tiles import TILE, Window, tile_light
+from quiltcli.formats.films import film_pictures
 from quiltcli.formats.inputs import is_regular
 from quiltcli.geometry import IntArray
 from quiltcli.images.facets import page_of, surroundings
@@ -31,7 +32,7 @@ from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import View
 
-Kept: TypeAlias = dict[tuple[tuple[Path, ...], str], Texels]
+Kept: TypeAlias = dict[tuple[tuple[Path, ...], str, int], Texels]
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ def project(
         QuiltError: as for a render.
     """
     master.check()
+    master = replace(master, fps=float(job.fps))
     if master.stereo and not job.is_stereo:
         raise JobError("--stereo is for two eyes (the job has one; viewer.stereo gives it two)")
     ready = prepare_made(job, options, f"project {master.kind}")
@@ -89,6 +91,21 @@ def _missing(ready: Prepared, master: Master) -> Iterator[Problem]:
         yield Problem("no such picture", file=str(path))
     if len(missing) > 10:
         yield Problem(f"and {len(missing) - 10} pictures more are missing", file=str(missing[0].parent))
+    if master.is_film and not missing:
+        yield from _beyond(ready, master)
+
+
+def _beyond(ready: Prepared, master: Master) -> Iterator[Problem]:
+    """Frames that come before a film or after it."""
+    for path in dict.fromkeys(path for view in ready.views for path in master.files(view.frame)):
+        count, rate = film_pictures(path)
+        last = max(view.frame for view in ready.views)
+        if count and (last - 1) / master.fps >= count / float(rate) - 1e-6:
+            words = f"has {count} pictures at {float(rate):g} a second, and none of frame {last}"
+            yield Problem(words, file=str(path))
+        first = min(view.frame for view in ready.views)
+        if first < 1:
+            yield Problem(f"begins with frame 1, and has none of frame {first}", file=str(path))
 
 
 def _fill(
@@ -105,13 +122,27 @@ def _fill(
     shown = list(pool.map(lambda band: _band(task, *band), list(_bands(stage, view))))
     whole, seen = sum(pixels for pixels, _ in shown), sum(count for _, count in shown)
     dark = 1 - seen / whole if whole else 0.0
-    warnings = (f"the picture does not show {dark:.1%} of the lit facets' pixels",) if dark > 0.0005 else ()
-    return Made(seen, warnings)
+    warnings = [f"the picture does not show {dark:.1%} of the lit facets' pixels"] if dark > 0.0005 else []
+    warnings += _other_rate(master, view)
+    camera = master.camera_of(view, texels.size)
+    warnings += [camera.notice(view)] if camera is not None and camera.notice(view) else []
+    return Made(seen, tuple(warnings))
+
+
+def _other_rate(master: Master, view: View) -> list[str]:
+    """A sentence where a film has another rate than the job."""
+    if not master.is_film:
+        return []
+    rate = float(film_pictures(master.files(view.frame)[0])[1])
+    if abs(rate / master.fps - 1) < 1e-3:
+        return []
+    return [f"the film has {rate:g} pictures a second, the job {master.fps:g} frames: the nearest before"]
 
 
 def _lookup(master: Master, kept: Kept, view: View) -> tuple[Lens, Texels]:
     """The picture of a view; one that stays is read once."""
-    key = (master.files(view.frame), view.eye if master.stereo else "")
+    eye, frame = view.eye if master.stereo else "", view.frame if master.is_film else 0
+    key = (master.files(view.frame), eye, frame)
     if key not in kept:
         kept.clear()
         kept[key] = loaded(master, view)[1]

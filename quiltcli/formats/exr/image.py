@@ -213,6 +213,11 @@ def part_names(path: Path) -> tuple[str, ...]:
     return tuple(header.get("name", "") for header in _read_headers(path))
 
 
+def channel_names(path: Path) -> list[tuple[str, ...]]:
+    """Names of the channels of each part of a file; errors as for `read_parts`."""
+    return [tuple(channel.name for channel in header["channels"]) for header in _read_headers(path)]
+
+
 def read_first(path: Path) -> Image:
     """The first part of a file, whatever others there are: the left eye's; errors as for `read_parts`."""
     return read_parts(path)[0]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +13,11 @@ from quiltcli.formats.corners import turned
 from quiltcli.formats.mesh.mesh import PolygonMesh
 from quiltcli.formats.usd.mesh import Asked, read_dress, read_faces, read_points
 from quiltcli.formats.usd.places import Moment
-from quiltcli.formats.usd.stage import library, open_stage
+from quiltcli.formats.usd.stage import library, open_stage, understood
 from quiltcli.formats.usd.walk import walk
 from quiltcli.geometry import FloatArray, IntArray, offsets
+
+MOST_CORNERS = 2**24
 
 
 def read_usd_mesh(path: Path) -> PolygonMesh:
@@ -26,37 +30,52 @@ def read_usd_mesh(path: Path) -> PolygonMesh:
         MeshError: the stage is wrong, or shows no polygon.
     """
     stage = open_stage(path)
-    code = library().Usd.TimeCode
-    time = code.EarliestTime() if stage.range is None else code(stage.range[0])
-    moment = Moment(stage, time)
-    vertices: list[FloatArray] = []
-    corners: list[IntArray] = []
-    counts: list[IntArray] = []
-    uv: list[FloatArray] = []
-    base = 0
+    with understood(path):
+        code = library().Usd.TimeCode
+        moment = Moment(stage, code.EarliestTime() if stage.range is None else code(stage.range[0]))
+        copies = list(_copies(moment))
+    if not any(len(one.counts) for one in copies):
+        raise MeshError(Problem("holds no polygons", str(path)))
+    counts = np.concatenate([one.counts for one in copies])
+    base = offsets([len(one.points) for one in copies])
+    pairs = np.concatenate([one.uv for one in copies])
+    return PolygonMesh(
+        vertices=np.concatenate([one.points for one in copies]),
+        corner_start=offsets(counts),
+        corners=np.concatenate([one.corners + first for one, first in zip(copies, base, strict=False)]),
+        uv=None if np.isnan(pairs).all() else pairs,
+        names=("",) * len(counts),
+        lines=np.zeros(len(counts), dtype=np.int64),
+        path=str(path),
+    )
+
+
+class _Copy(NamedTuple):
+    """A mesh in one of its places: points (V, 3), corners (C,) of faces with counts (F,), their uv (C, 2)."""
+
+    points: FloatArray
+    corners: IntArray
+    counts: IntArray
+    uv: FloatArray
+
+
+def _copies(moment: Moment) -> Iterator[_Copy]:
+    """All meshes in all their places."""
+    stage, time, total = moment.stage, moment.time, 0
     for piece in walk(stage, time).pieces:
         faces = read_faces(stage, piece.mesh, time)
         points = read_points(stage, piece.mesh, time, faces.corners.vertices)
         (found, _) = read_dress(stage, piece.mesh, faces, Asked(("st", "")), time, moving=False).uv
-        pairs = np.full((len(faces.corners.vertex), 2), np.nan) if found is None else found.at_corners
+        corner = faces.corners.vertex
+        uv = np.full((len(corner), 2), np.nan) if found is None else found.at_corners
         for place in (place for place in piece.places if moment.shown(place)):
-            for matrix in stage.world @ moment.matrices(place):
-                vertices.append(points @ matrix[:3, :3].T + matrix[:3, 3])
+            matrices = stage.world @ moment.matrices(place)
+            total += len(matrices) * max(len(corner), len(points))
+            if total > MOST_CORNERS:
+                words = f"and all before it have {total:,} corners (expected at most {MOST_CORNERS:,})"
+                raise stage.error(piece.prim, words)
+            for matrix in matrices:
                 mirrored = np.linalg.det(matrix[:3, :3]) < 0
-                order = turned(faces.start) if mirrored else np.arange(len(pairs))
-                corners.append(faces.corners.vertex[order] + base)
-                uv.append(pairs[order])
-                counts.append(np.diff(faces.start))
-                base += len(points)
-    if not sum(map(len, counts)):
-        raise MeshError(Problem("holds no polygons", str(path)))
-    sizes, joined = np.concatenate(counts), np.concatenate(uv)
-    return PolygonMesh(
-        vertices=np.concatenate(vertices),
-        corner_start=offsets(sizes),
-        corners=np.concatenate(corners),
-        uv=None if np.isnan(joined).all() else joined,
-        names=("",) * len(sizes),
-        lines=np.zeros(len(sizes), dtype=np.int64),
-        path=str(path),
-    )
+                order = turned(faces.start) if mirrored else np.arange(len(corner))
+                there = points @ matrix[:3, :3].T + matrix[:3, 3]
+                yield _Copy(there, corner[order], np.diff(faces.start), uv[order])

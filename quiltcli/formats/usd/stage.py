@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,6 +87,23 @@ def library() -> Any:
     return pxr
 
 
+@contextmanager
+def understood(path: Path) -> Iterator[None]:
+    """Turn what the library says of a stage into errors of ours, and keep its warnings from the terminal.
+
+    Raises:
+        MeshError: something of the stage cannot be read.
+    """
+    pxr = library()
+    heard = pxr.UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    except (pxr.Tf.ErrorException, pxr.Tf.CppException) as error:
+        raise MeshError(_problem(path, error)) from None
+    finally:
+        heard.TakeUncoalescedDiagnostics()
+
+
 def open_stage(path: Path | str) -> Stage:
     """Open a stage with all its payloads.
 
@@ -96,14 +114,8 @@ def open_stage(path: Path | str) -> Stage:
     path = Path(path)
     check_input(path, MeshError, "a mesh")
     pxr = library()
-    # Whatever the library has to say would go to the terminal.
-    heard = pxr.UsdUtils.CoalescingDiagnosticDelegate()
-    try:
+    with understood(path):
         usd = pxr.Usd.Stage.Open(str(path))
-    except pxr.Tf.ErrorException as error:
-        raise MeshError(_problem(path, error)) from None
-    finally:
-        heard.TakeUncoalescedDiagnostics()
     faults = list(dict.fromkeys(_one_line(str(error)) for error in usd.GetCompositionErrors()))
     if faults:
         more = [f"and {len(faults) - _LISTED} faults more"] if len(faults) > _LISTED else []
@@ -150,11 +162,10 @@ def files_beside(path: Path) -> Iterator[Path]:
     try:
         pxr = library()
         stage = open_stage(path)
+        with understood(path):
+            layers, assets, _ = pxr.UsdUtils.ComputeAllDependencies(str(path))
     except (MeshError, ImportError):
         return
-    heard = pxr.UsdUtils.CoalescingDiagnosticDelegate()
-    layers, assets, _ = pxr.UsdUtils.ComputeAllDependencies(str(path))
-    heard.TakeUncoalescedDiagnostics()
     names = [layer.realPath for layer in (*layers, *stage.usd.GetUsedLayers())] + list(assets)
     own = path.resolve()
     for name in names:

@@ -12,6 +12,7 @@ from quiltcli.formats.usd.lights import is_light
 from quiltcli.formats.usd.materials import Material, read_material
 from quiltcli.formats.usd.mesh import Asked
 from quiltcli.formats.usd.places import Instancer, Place
+from quiltcli.formats.usd.shapes import is_shape, shape_mesh
 from quiltcli.formats.usd.skins import Skin, read_skins
 from quiltcli.formats.usd.stage import Stage, library, path_of
 
@@ -32,6 +33,7 @@ class Piece:
         materials: what its faces are made of; None for a face without a material that is read.
         subsets: those of its faces that have materials of their own, and rows of `materials`.
         skin: what moves its points, or None.
+        mesh: its schema, `pxr.UsdGeom.Mesh`; that of another stage for a shape by formula.
     """
 
     prim: Any
@@ -39,11 +41,7 @@ class Piece:
     materials: tuple[Material | None, ...]
     subsets: tuple[tuple[Any, int], ...]
     skin: Skin | None
-
-    @property
-    def mesh(self) -> Any:
-        """Its schema, `pxr.UsdGeom.Mesh`."""
-        return library().UsdGeom.Mesh(self.prim)
+    mesh: Any
 
     def asked(self, uv_names: tuple[str, ...]) -> Asked:
         """The primvars that its materials look up, of texture coordinates the first two of these."""
@@ -63,11 +61,13 @@ class Shown:
         pieces: its meshes.
         lights: prims of its lights.
         notices: what is left out.
+        shelf: the stage that holds the meshes of shapes.
     """
 
     pieces: tuple[Piece, ...]
     lights: tuple[Any, ...]
     notices: tuple[str, ...]
+    shelf: Any
 
 
 @dataclass(eq=False)
@@ -75,6 +75,7 @@ class _Found:
     """A mesh while its places are gathered."""
 
     prim: Any
+    mesh: Any
     materials: tuple[Material | None, ...]
     subsets: tuple[tuple[Any, int], ...]
     places: list[Place] = field(default_factory=list)
@@ -105,6 +106,7 @@ class _Walk:
     left: Counter[str] = field(default_factory=Counter)
     foreign: list[str] = field(default_factory=list)
     cages: set[str] = field(default_factory=set)
+    shelf: Any = None
     prims: int = 0
     places: int = 0
 
@@ -114,10 +116,17 @@ class _Walk:
         self._take(root, None, 0)
         skins = read_skins([one.prim for one in self.found.values()])
         pieces = tuple(
-            Piece(one.prim, tuple(one.places), one.materials, one.subsets, skins.get(path_of(one.prim)))
+            Piece(
+                one.prim,
+                tuple(one.places),
+                one.materials,
+                one.subsets,
+                skins.get(path_of(one.prim)),
+                one.mesh,
+            )
             for one in self.found.values()
         )
-        return Shown(pieces, tuple(self.lights), tuple(self._notices()))
+        return Shown(pieces, tuple(self.lights), tuple(self._notices()), self.shelf)
 
     def _take(self, top: Any, within: Instancer | None, depth: int) -> None:
         """All that is shown below a prim, itself included."""
@@ -131,7 +140,7 @@ class _Walk:
             if kind == "PointInstancer":
                 prims.PruneChildren()
                 self._instance(prim, within, depth)
-            elif kind == "Mesh":
+            elif kind == "Mesh" or is_shape(kind):
                 self._mesh(prim, within)
             elif is_light(prim):
                 if within is None and not _left_out(prim):
@@ -171,10 +180,20 @@ class _Walk:
         same = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         key = (same.GetPath(), *(None if one is None else one.path for one in materials))
         if key not in self.found:
-            self.found[key] = _Found(prim, materials, subsets)
-            if library().UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr().Get() != "none":
-                self.cages.add(path_of(prim))
+            self.found[key] = _Found(prim, self._schema(prim), materials, subsets)
         self.found[key].places.append(Place(prim, within))
+
+    def _schema(self, prim: Any) -> Any:
+        """The mesh of a prim."""
+        geom = library().UsdGeom
+        if is_shape(str(prim.GetTypeName())):
+            if self.shelf is None:
+                self.shelf = library().Usd.Stage.CreateInMemory()
+            return shape_mesh(self.stage, self.shelf, prim, self.time)
+        mesh = geom.Mesh(prim)
+        if mesh.GetSubdivisionSchemeAttr().Get() != "none":
+            self.cages.add(path_of(prim))
+        return mesh
 
     def _bound(self, prim: Any) -> tuple[tuple[Material | None, ...], tuple[tuple[Any, int], ...]]:
         """The materials of a mesh: first of the mesh itself, then of its subsets."""

@@ -64,7 +64,7 @@ def draw_frame(
             stage, viewer, buffers, threads, only, dirty=dirty, crew=crew, exposures=exposures
         )
     except TooNearError:
-        if stage.job.render.samples > 1 or exposures is not None:
+        if exposures is not None:
             raise
         if dirty is not None:
             dirty[:] = True
@@ -95,12 +95,18 @@ def draw_moment(
         records.append(
             draw_frame(stage, viewer, buffers, threads, theirs, dirty=dirty, crew=crew, exposures=open_for)
         )
-    record = corrected(stage, view, buffers, together(records), threads, only)
+    record = corrected(stage, view, buffers, together(records), threads, only, dirty)
     return replace(record, eye=view.eye, warnings=(*record.warnings, *moment.warnings))
 
 
 def corrected(
-    stage: Stage, view: View, buffers: Buffers, record: FrameRecord, threads: int, only: BoolArray | None
+    stage: Stage,
+    view: View,
+    buffers: Buffers,
+    record: FrameRecord,
+    threads: int,
+    only: BoolArray | None,
+    dirty: BoolArray | None = None,
 ) -> FrameRecord:
     """Correct what was drawn for the panels, if the job wants that; the record with what it took."""
     response = corrects(stage)
@@ -113,6 +119,8 @@ def corrected(
             for viewer, theirs in facets_by_viewer(view, stage.facets.count, only)
         ]
     headroom = sum(parts, Headroom())
+    if response.lifts and dirty is not None:
+        dirty[:] = True  # what was black is not any more
     return replace(
         record,
         seconds={**record.seconds, **clock.seconds},

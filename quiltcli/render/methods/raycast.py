@@ -4,7 +4,8 @@ Embree's rays are single precision: near an edge they may name the neighbour, an
 millionth of their distance apart the farther one. So five rays are cast around every pixel's sample,
 and one from just behind the hit back to the eye. Where all six name one triangle, that is it; for the
 other pixels all triangles that were named, and those that touch them, are met in float64, and the
-nearest is taken. Nothing of binning and rasterization takes part.
+nearest is taken. Nothing of binning and rasterization takes part. Several samples a pixel are cast one after
+another where the rasterizer has them.
 
 Where a ray meets something that light may pass, it goes on behind it up to what is opaque, and all that
 it has met is met again in float64 and blended in the order of distance.
@@ -13,10 +14,9 @@ it has met is met again in float64 and blended in the order of distance.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -24,15 +24,18 @@ from quiltcli.display import eyes_apart, lit_facets
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, IntArray, dot
 from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
+from quiltcli.render.antialiasing import in_quilt, sample_places
 from quiltcli.render.batch import put_layers
 from quiltcli.render.buffers import Buffers, background_of, clear, lay_background, lay_sky
 from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage
 from quiltcli.render.sums import Sums, new_sums, summed
+from quiltcli.scene import Scene
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill
-from quiltcli.shading.layers import blended
+from quiltcli.shading.layers import Layer, blended
+from quiltcli.shading.shadows import CENTRE, Sample
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Hits
 from quiltcli.visibility.rays.embree import Target, aim, cast, plane_distance, reach_along
@@ -66,24 +69,46 @@ def cast_frame(
     gaze = Gaze(viewer, rays)
     target = target_of(stage, viewer)
     neighbours = Neighbours(stage.scene.vertices, stage.scene.triangles)
-    sloped, normals = stage.scene.textures is not None, stage.scene.corner_normals
+    scene, channels, count = stage.scene, stage.job.output.channels, stage.job.render.samples
+    light = summed(channels) if count > 1 else ()
+    data = tuple(name for name in channels if name not in light)
     clear(stage, buffers, only)
     blocks = np.flatnonzero(rays.lit[stage.blocks.facet])
     lay_background(stage, blocks, buffers, rays)
 
+    def seen(pixels: Places, sample: Sample = CENTRE) -> tuple[Hits, Iterable[Layer]]:
+        """What pixels see at once, and what others of them see through something."""
+        triangle, through = first_triangles(target, neighbours, pixels, scene.soft)
+        rows = np.flatnonzero((triangle >= 0) & ~through)
+        sloped = scene.textures is not None
+        hits = ray_hits(target, pixels.take(rows), triangle[rows], scene.corner_normals, sloped=sloped)
+        if not through.any():
+            return hits, ()
+        others = pixels.take(np.flatnonzero(through))
+        return hits, layers_of(scene, target, neighbours, others, viewer.eye, sample)
+
     def draw(address: IntArray) -> int:
         address = address[lit_pixels(address, stage.layout, stage.owners, rays)]
-        pixels = places(address, stage.layout, stage.owners, rays)
-        triangle, through = first_triangles(target, neighbours, pixels, stage.scene.soft)
-        rows = np.flatnonzero((triangle >= 0) & ~through)
-        hits = ray_hits(target, pixels.take(rows), triangle[rows], normals, sloped=sloped)
-        if rows.size:
-            fill(buffers, stage.job.output.channels, gaze, Shaded(stage.scene, viewer.eye, hits))
-        if not through.any():
-            return hits.inside
-        return hits.inside + cast_through(
-            stage, target, neighbours, pixels.take(np.flatnonzero(through)), gaze, buffers
+        hits, found = seen(places(address, stage.layout, stage.owners, rays))
+        if hits.triangle.size:
+            fill(buffers, data, gaze, Shaded(scene, viewer.eye, hits))
+        inside = hits.inside + put_layers(
+            found, sums_of(address, summed(data)), buffers, data, gaze, background_of(stage, rays)
         )
+        if light and address.size:
+            add_light(address)
+        return inside
+
+    def add_light(address: IntArray) -> None:
+        sums = sums_of(address, light)
+        for k, place in enumerate(sample_places(count)):
+            sample, beside = Sample(k, count), in_quilt(stage.layout, place)
+            hits, found = seen(places(address, stage.layout, stage.owners, rays, beside), sample)
+            if hits.triangle.size:
+                sums.add(Shaded(scene, viewer.eye, hits, sample=sample))
+            for layer in found:
+                sums.add(layer.shaded, layer.weight)
+        sums.store(buffers, count, background_of(stage, rays))
 
     with ThreadPoolExecutor(threads) as pool:
         visible = sum(pool.map(draw, pixels_of(stage, rays.lit)))
@@ -137,13 +162,17 @@ def pixels_of(stage: Stage, lit: BoolArray) -> Iterator[IntArray]:
             yield chunk + start
 
 
-def cast_through(
-    stage: Stage, target: Target, neighbours: Neighbours, pixels: Places, gaze: Gaze, buffers: Buffers
-) -> int:
-    """Draw pixels that are seen through something; how many inside facets show the scene."""
-    scene, channels = stage.scene, stage.job.output.channels
+def sums_of(address: IntArray, channels: tuple[str, ...]) -> Sums:
+    """Empty sums of pixels (P,) of ascending addresses."""
+    first, size = (int(address[0]), int(address[-1]) - int(address[0]) + 1) if address.size else (0, 0)
+    return Sums(new_sums(channels, lambda dtype: np.zeros(size, dtype)), channels, first)
+
+
+def layers_of(
+    scene: Scene, target: Target, neighbours: Neighbours, pixels: Places, eye: FloatArray, sample: Sample
+) -> Iterator[Layer]:
+    """What pixels see through something, from the front to the back."""
     assert scene.soft is not None
-    assert gaze.rays is not None
     light = np.ones(pixels.address.size, dtype=np.bool_)
     found = (
         LayerHits(
@@ -153,10 +182,7 @@ def cast_through(
         )
         for row, triangle in met_through(target, neighbours, pixels, scene.soft).layers(light)
     )
-    first, last = int(pixels.address[0]), int(pixels.address[-1])
-    sums = Sums(new_sums(summed(channels), partial(np.zeros, last + 1 - first)), summed(channels), first)
-    some = blended(found, light, scene, gaze.viewer.eye)
-    return put_layers(some, sums, buffers, channels, gaze, background_of(stage, gaze.rays))
+    yield from blended(found, light, scene, eye, sample)
 
 
 def ray_hits(

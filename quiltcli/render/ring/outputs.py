@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from quiltcli import __version__
-from quiltcli.formats.exr.image import write_exr
+from quiltcli.formats.exr.image import read_exr, write_exr
 from quiltcli.formats.whole import write_text
 from quiltcli.images.names import frame_digits
 from quiltcli.job import dump_job, dump_yaml
 from quiltcli.job.dump import plain
 from quiltcli.render.ring.setup import RingStage
 from quiltcli.ring.curve import Curve
-from quiltcli.ring.picture import Picture, Show
+from quiltcli.ring.outline import lit_pixels
+from quiltcli.ring.picture import Counts, Picture, Show
 
 _FORMAT = 1
 
@@ -50,6 +51,14 @@ def write_tones(
         "quilt:reflection": stage.display.diffuser.reflection,
     }
     write_exr(path, channels, attributes, stage.job.output.compression)
+
+
+def read_tones(folder: Path, stage: RingStage, turn: int, position: int, side: int) -> Picture:
+    """The light of one side at one position, as `write_tones` has written it (OutputError)."""
+    found = read_exr(tones_path(folder, turn, position, side)).channels
+    pose = stage.rig.at(stage.rig.angle(position), side)
+    buffers = {name: values.reshape(-1) for name, values in found.items()}
+    return Picture(pose, lit_pixels(stage.rig, pose), buffers, Counts())
 
 
 def viewers_json(curve: Curve) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from quiltcli.formats.bitplanes import PLANES, pack, packed_name, read_packed, u
 from quiltcli.geometry import BoolArray
 from quiltcli.halftone import Sequel, halftone
 from quiltcli.render.ring.crew import shared_out
-from quiltcli.render.ring.outputs import tones_path, write_tones
+from quiltcli.render.ring.outputs import read_tones, tones_path, write_tones
 from quiltcli.render.ring.setup import RingStage
 from quiltcli.render.workers import shared_array
 from quiltcli.ring.picture import Counts, Show, draw_picture
@@ -40,11 +40,13 @@ class Part:
         frame: frame number.
         number: of the frame among the job's, from 0: packed pictures are numbered through.
         positions: numbers of mirror positions from 0, ascending.
+        on_disk: those of them whose light an earlier run has written; it is read, not drawn.
     """
 
     frame: int
     number: int
     positions: Sequence[int]
+    on_disk: frozenset[int] = frozenset()
 
 
 @dataclass
@@ -122,15 +124,19 @@ def draw_tones(
 
     def one(row: int) -> tuple[Counts, float]:
         position, counts = part.positions[row], Counts()
-        angle = stage.rig.angle(position)
-        pictures = [draw_picture(show, angle, side) for side in range(len(stage.rig.sides))]
+        angle, there = stage.rig.angle(position), tones_in is not None and position in part.on_disk
+        sides = range(len(stage.rig.sides))
+        if tones_in is not None and there:
+            pictures = [read_tones(tones_in, stage, part.number, position, side) for side in sides]
+        else:
+            pictures = [draw_picture(show, angle, side) for side in sides]
         start = time.perf_counter()
         tones = tones_of(stage.rig, pictures, stage.halftone, stage.shortest)
         sheets.tones[:, row], sheets.inside[row] = tones.values, tones.inside
         for picture in pictures:
             counts.add(picture.counts)
         counts.seconds["tones"] = time.perf_counter() - start
-        if tones_in is not None:
+        if tones_in is not None and not there:
             start = time.perf_counter()
             for side, picture in enumerate(pictures):
                 path = tones_path(tones_in, part.number, position, side)

@@ -272,14 +272,17 @@ def _part(
         ):
             problems.append(path)
     finished -= unfinished
+    on_disk = set()
     for position in positions if output.tones else ():
-        path = tones_path(folder, number, position)
-        if not is_complete(path, sha, frame):
+        paths = [tones_path(folder, number, position, side) for side in range(len(stage.rig.sides))]
+        if options.resume and all(is_complete(path, sha, frame) for path in paths):
+            on_disk.add(position)
+        else:
             finished.discard(position)
-        elif not output.packed:
-            finished.add(position)
-        if path.exists() and not options.resume and not options.overwrite:
-            problems.append(path)
+        if not options.resume and not options.overwrite:
+            problems += [path for path in paths if path.exists()]
+    if not output.packed:
+        finished |= on_disk
     if problems:
         more = f" and {len(problems) - 1} more" if len(problems) > 1 else ""
         words = f"exists already{more} (use --resume to keep finished pictures, --overwrite to replace them)"
@@ -287,4 +290,4 @@ def _part(
     if stage.halftone.angle and finished < wanted:
         finished = set()
     kept = [position for position in positions if not (options.resume and position in finished)]
-    return Part(frame, number, kept)
+    return Part(frame, number, kept, frozenset(on_disk))

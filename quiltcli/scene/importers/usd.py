@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from quiltcli.errors import counted
-from quiltcli.formats.corners import Faces
+from quiltcli.formats.corners import Faces, normals_of_groups, same_normals
 from quiltcli.formats.usd.changes import Movement, movement
 from quiltcli.formats.usd.mesh import read_dress, read_faces, read_points, subset_rows
 from quiltcli.formats.usd.places import Moment
 from quiltcli.formats.usd.primvars import read_normals
 from quiltcli.formats.usd.skins import skinned
-from quiltcli.formats.usd.stage import Stage, library, open_stage
+from quiltcli.formats.usd.stage import Stage, library, open_stage, understood
 from quiltcli.formats.usd.walk import Piece, Shown, walk
 from quiltcli.geometry import FloatArray
 from quiltcli.scene.importers.cuts import (
@@ -62,7 +62,8 @@ class UsdModel:
     @property
     def notices(self) -> tuple[str, ...]:
         """What of the stage is not drawn as it means."""
-        return (*self.stage.notices, *self.shown.notices, *self._own_notices())
+        with understood(self.stage.path):
+            return (*self.stage.notices, *self.shown.notices, *self._own_notices())
 
     def _own_notices(self) -> Iterator[str]:
         if self.movement.dresses and self.movement.clock is not None:
@@ -88,19 +89,21 @@ class UsdModel:
 
     def form(self, seconds: float | None, playing: Playing | None) -> Hashable:
         """What is equal at two times whose parts have the same triangles."""
-        if not self.movement.forms:
-            return None
-        moment = self._moment(seconds, playing)
-        everything = self._all_hidden(moment)
-        return tuple(
-            (len(self._places(moment, self.shown.pieces[number], everything)), self._key(number, moment))
-            + tuple(moment.shown(place) for place in self.shown.pieces[number].places)
-            for number in sorted(self.movement.forms)
-        )
+        with understood(self.stage.path):
+            if not self.movement.forms:
+                return None
+            moment = self._moment(seconds, playing)
+            everything = self._all_hidden(moment)
+            return tuple(
+                (len(self._places(moment, self.shown.pieces[number], everything)), self._key(number, moment))
+                + tuple(moment.shown(place) for place in self.shown.pieces[number].places)
+                for number in sorted(self.movement.forms)
+            )
 
     def hidden(self, seconds: float, playing: Playing) -> bool:
         """Whether nothing is to be seen at a time."""
-        return bool(self.movement.forms) and self._all_hidden(self._moment(seconds, playing))
+        with understood(self.stage.path):
+            return bool(self.movement.forms) and self._all_hidden(self._moment(seconds, playing))
 
     def parts(self, seconds: float | None = None, playing: Playing | None = None) -> tuple[Part, ...]:
         """A part for each mesh and material, all its copies in it; at rest as the animation begins.
@@ -108,30 +111,33 @@ class UsdModel:
         Raises:
             MeshError: a mesh is broken, or there are too many triangles.
         """
-        moment = self._moment(seconds, playing)
-        everything = seconds is not None and self._all_hidden(moment)
-        self._check_size(moment, everything)
-        found: list[Part] = []
-        for number, piece in enumerate(self.shown.pieces):
-            places = self._places(moment, piece, everything)
-            found += self._parts(piece, self._form(number, moment), self._posed(number, moment), places)
-        return tuple(found)
+        with understood(self.stage.path):
+            moment = self._moment(seconds, playing)
+            everything = seconds is not None and self._all_hidden(moment)
+            self._check_size(moment, everything)
+            found: list[Part] = []
+            for number, piece in enumerate(self.shown.pieces):
+                places = self._places(moment, piece, everything)
+                found += self._parts(piece, self._form(number, moment), self._posed(number, moment), places)
+            return tuple(found)
 
     def pose(self, seconds: float, playing: Playing) -> tuple[FloatArray, FloatArray]:
         """Vertices and normals (V, 3) of all parts after one another at a time."""
-        moment = self._moment(seconds, playing)
-        everything = self._all_hidden(moment)
-        placed = []
-        for number, piece in enumerate(self.shown.pieces):
-            places, posed = self._places(moment, piece, everything), self._posed(number, moment)
-            form = self._form(number, moment)
-            placed += [placed_cut(form, cut, posed, places) for cut in form.cuts]
-        vertices, normals = joined(placed)
-        return at_one_place(vertices) if everything else vertices, normals
+        with understood(self.stage.path):
+            moment = self._moment(seconds, playing)
+            everything = self._all_hidden(moment)
+            placed = []
+            for number, piece in enumerate(self.shown.pieces):
+                places, posed = self._places(moment, piece, everything), self._posed(number, moment)
+                form = self._form(number, moment)
+                placed += [placed_cut(form, cut, posed, places) for cut in form.cuts]
+            vertices, normals = joined(placed)
+            return at_one_place(vertices) if everything else vertices, normals
 
     def lights(self, seconds: float | None = None, playing: Playing | None = None) -> tuple[FileLight, ...]:
         """The stage's lights at a time."""
-        return lights_at(self.shown.lights, self._moment(seconds, playing))
+        with understood(self.stage.path):
+            return lights_at(self.shown.lights, self._moment(seconds, playing))
 
     def _moment(self, seconds: float | None, playing: Playing | None) -> Moment:
         """The stage at a time; at rest it is as its animation begins."""
@@ -193,11 +199,14 @@ class UsdModel:
             return self._points[number]
         piece, form = self.shown.pieces[number], self._form(number, moment)
         points = read_points(self.stage, piece.mesh, moment.time, form.faces.corners.vertices)
+        normals = read_normals(self.stage, piece.mesh, form.faces.corners, moment.time)
+        directions = None if normals is None else normals.at_corners
         if piece.skin is not None:
-            posed = Posed(skinned(piece.prim, piece.skin, moment, points), None)
-        else:
-            normals = read_normals(self.stage, piece.mesh, form.faces.corners, moment.time)
-            posed = Posed(points, None if normals is None else normals.at_corners)
+            points = skinned(piece.prim, piece.skin, moment, points)
+            if normals is not None:
+                # Smooth where the mesh's own are one, and sharp where they differ.
+                directions = normals_of_groups(points, form.faces, same_normals(form.faces, normals))
+        posed = Posed(points, directions)
         if number not in self.movement.points and number not in self.movement.forms:
             self._points[number] = posed
         return posed
@@ -226,6 +235,7 @@ def read_usd_model(path: Path) -> UsdModel:
         MeshError: the stage is wrong.
     """
     stage = open_stage(path)
-    time = library().Usd.TimeCode
-    shown = walk(stage, time.EarliestTime() if stage.range is None else time(stage.range[0]))
-    return UsdModel(stage, shown, movement(stage, shown))
+    with understood(path):
+        time = library().Usd.TimeCode
+        shown = walk(stage, time.EarliestTime() if stage.range is None else time(stage.range[0]))
+        return UsdModel(stage, shown, movement(stage, shown))

@@ -8,6 +8,7 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray, FloatArray, IntArray, OwnerArray, normalized
 from quiltcli.layout import Layout
+from quiltcli.projection.curved import ChartView
 from quiltcli.projection.planar import QuiltRays
 
 NEIGHBOUR = 0.05
@@ -69,8 +70,22 @@ class Places:
         return np.asarray(ray[:, :, 0] * x[:, None] + ray[:, :, 1] * y[:, None] + ray[:, :, 2])
 
 
-def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> Places:
-    """The pixels at flat quilt addresses (P,), each of which a facet or its bleed owns."""
+def places(
+    address: IntArray,
+    layout: Layout,
+    owners: OwnerArray,
+    rays: QuiltRays,
+    beside: FloatArray | None = None,
+) -> Places:
+    """The pixels at flat quilt addresses (P,), each of which a facet or its bleed owns.
+
+    Args:
+        address: the addresses.
+        layout: the facets' places.
+        owners: whose every quilt pixel is.
+        rays: rays through the quilt.
+        beside: (F, 2) where in each facet's pixels rays go through, from the centre; None for there.
+    """
     owner = owners[address].astype(np.int64)
     facet = np.abs(owner) - 1
     page = layout.page[facet].astype(np.int64)
@@ -79,16 +94,32 @@ def places(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRay
     x, y = local % width, local // width
     ray = rays.eye_from_quilt[facet]
     origin: FloatArray | None = None
+    off = None if beside is None else beside[facet]
     for row, view in enumerate(rays.views):
         if view is not None:
             mine = np.flatnonzero(facet == row)
             if mine.size:
-                ray[mine] = view.matrices(x[mine] + 0.5, y[mine] + 0.5)
-                begin = view.origins(x[mine] + 0.5, y[mine] + 0.5)
+                at_x, at_y = x[mine] + 0.5, y[mine] + 0.5
+                if beside is not None:
+                    at_x, at_y = _with_rays(view, at_x, at_y, beside[row])
+                ray[mine] = view.matrices(at_x, at_y)
+                begin = view.origins(at_x, at_y)
                 if begin is not None:
                     origin = np.zeros((address.size, 3)) if origin is None else origin
                     origin[mine] = begin.T
+    if off is not None:
+        # Read at their centres, the matrices give the rays beside these.
+        ray[:, :, 2] += ray[:, :, 0] * off[:, :1] + ray[:, :, 1] * off[:, 1:]
     return Places(address, facet, owner < 0, page, x, y, ray, origin)
+
+
+def _with_rays(
+    view: ChartView, x: FloatArray, y: FloatArray, beside: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Places (P,) beside pixels' centres, and the centres where there is no ray, as past a fisheye's rim."""
+    there_x, there_y = x + beside[0], y + beside[1]
+    known = np.isfinite(view.rays(there_x, there_y).sum(axis=0))
+    return np.where(known, there_x, x), np.where(known, there_y, y)
 
 
 def lit_pixels(address: IntArray, layout: Layout, owners: OwnerArray, rays: QuiltRays) -> BoolArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quiltcli.geometry import IntArray
+from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.visibility.resolve.hits import Hits
 from quiltcli.visibility.resolve.pixels import MixedTiles, Rays, pixel_hits
 from quiltcli.visibility.resolve.reader import Reader
@@ -15,6 +15,7 @@ from quiltcli.visibility.resolve.tiles import Tiles, in_parts, owned_pixels, til
 from quiltcli.visibility.setup.samples import Samples
 
 _AT_ONCE = 1024  # microtiles
+_MANY = 3  # one pixel in so many, from which on all of a microtile's rays are made
 
 
 @dataclass(frozen=True)
@@ -31,26 +32,42 @@ class DisplacedTiles(MixedTiles):
         """What their pixels see, if any of them sees something."""
         keys = self.reader.canvas.keys.take(self.tiles.index, axis=0)
         pixel, places, inside = owned_pixels(self.reader.blocks, self.tiles, keys != 0)
-        keys = keys.reshape(-1).take(pixel)
+        keys = keys.reshape(-1)
         rays = rays_of(self.reader, self.samples, self.tiles, pixel)
+        keys = keys if pixel.size == keys.size else keys.take(pixel)
         return pixel_hits(self.reader, self.tiles, keys, pixel, places, inside, rays)
 
 
 def rays_of(reader: Reader, samples: Samples, tiles: Tiles, pixel: IntArray) -> Rays:
     """Rays of pixels (G,) of microtiles of patches, counted through all of these."""
-    limits = reader.limits
-    # All pixels of microtiles, for a matrix each is less to move than one a pixel.
     x, y = (samples.place[k].take(tiles.index, axis=0) for k in (0, 1))
-    directions = limits.directions(tiles.block.astype(np.int32)[:, None], x, y)
-    vectors = np.empty((3, pixel.size))
+    if _MANY * pixel.size < x.size:
+        x, y = (values.reshape(-1).take(pixel) for values in (x, y))
+        return _rays(reader, tiles.block.take(pixel >> 6), x, y)
+    # A matrix a microtile, not a pixel: numbers that few pixels ask for cost less than looking it up.
+    every = _rays(reader, tiles.block[:, None], x, y)
+    return every.of(None if _all_of(pixel, x.size) else pixel)
+
+
+def _all_of(pixel: IntArray, count: int) -> bool:
+    return pixel.size == count and bool((pixel == np.arange(count)).all())
+
+
+def _rays(reader: Reader, block: IntArray, x: FloatArray, y: FloatArray) -> Rays:
+    """Rays of pixels (...) of blocks that broadcast with them, through at columns x and rows y."""
+    limits = reader.limits
+    matrix = limits.rays[block]
+    vectors, part = np.empty((3, *x.shape)), np.empty(x.shape)
     for k in range(3):
-        directions[k].reshape(-1).take(pixel, out=vectors[k])
+        np.multiply(matrix[..., k, 0], x, out=vectors[k])
+        vectors[k] += np.multiply(matrix[..., k, 1], y, out=part)
+        vectors[k] += matrix[..., k, 2]
     if limits.radial:
         depth = np.sqrt(vectors[0] * vectors[0] + vectors[1] * vectors[1] + vectors[2] * vectors[2])
     else:
         look = limits.look
         depth = look[0] * vectors[0] + look[1] * vectors[1] + look[2] * vectors[2]
-    return Rays(x.reshape(-1).take(pixel), y.reshape(-1).take(pixel), vectors, depth)
+    return Rays(x, y, vectors, depth)
 
 
 def read_displaced(reader: Reader, samples: Samples) -> Iterator[DisplacedTiles]:

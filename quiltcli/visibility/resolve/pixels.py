@@ -74,6 +74,15 @@ class Rays:
     vectors: FloatArray
     depth: FloatArray
 
+    def of(self, pixel: IntArray | None) -> Rays:
+        """Of rays (n, 64) of microtiles those of pixels (G,), counted through all; None for all of them."""
+
+        def chosen(values: FloatArray) -> FloatArray:
+            flat = values.reshape(*values.shape[:-2], -1)
+            return flat if pixel is None else flat.take(pixel, axis=-1)
+
+        return Rays(chosen(self.x), chosen(self.y), chosen(self.vectors), chosen(self.depth))
+
 
 def pixel_hits(
     reader: Reader,

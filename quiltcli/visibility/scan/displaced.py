@@ -154,7 +154,8 @@ def _tile_keys(planes: Planes, spans: Spans, samples: Samples, limits: DepthRang
         table[:, k] = np.take(plane, row, axis=1).T
     points = samples.points.take(spans.tile, axis=0)
     # Every product and sum is exact on these grids: the same in any order.
-    values = table @ points
+    values = table[:, :, :2] @ points
+    values += table[:, :, 2:]
     inverse = np.ascontiguousarray(values[:, 0])
     np.maximum(inverse, planes.low.take(row)[:, None], out=inverse)
     np.minimum(inverse, planes.high.take(row)[:, None], out=inverse)

@@ -22,7 +22,7 @@ class Samples:
 
     Attributes:
         place: (2, M, 64) columns and rows in the block at which rays go through, counted from centres.
-        points: (M, 3, 64) the same on the grid on which edges are decided, and 1.
+        points: (M, 2, 64) the same on the grid on which edges are decided.
         lit: (M, 64) pixels that are the facet's or its bleed, and show an image.
         box: (4, M) least and greatest column, least and greatest row of `points` over the lit pixels.
         reach: (K, 2) how far at most samples of each block lie beside their pixels.
@@ -50,38 +50,30 @@ def samples_of(
     seen = rays.patched
     assert seen is not None
     count = canvas.touched.size
-    place, points, box = np.empty((2, count, 64)), np.empty((count, 3, 64)), np.empty((4, count))
-    lit = np.zeros((count, 64), dtype=np.bool_)
+    # Every microtile is one of a patch, and is written.
+    place, lit = np.empty((2, count, 64)), np.empty((count, 64), dtype=np.bool_)
     owned = np.unpackbits(canvas.owned, axis=1).view(np.bool_)
-    points[:, 2] = 1.0
     for some in alike(patches, which):
         at = np.searchsorted(which, some)
-        number, values, shown = _of_blocks(rays, patches, seen, canvas, some, at, sample)
-        # They ascend, mostly one after another: a range is copied to in half the time.
-        first, end = int(number[0]), int(number[-1]) + 1
-        tiles = slice(first, end) if end - first == number.size else number
+        tiles, values, shown = _of_blocks(rays, patches, seen, canvas, some, at, sample)
         place[:, tiles] = values
-        shown &= owned[tiles]
-        lit[tiles] = shown
-        # Unlit pixels keep the places of their neighbours in the lattice: no number that spreads.
-        dark = None if shown.all() else ~shown
-        for k in (0, 1):
-            decided = _on_grid(values[k], SHIFT[k])
-            points[tiles, k] = decided
-            for side, least, beyond in ((2 * k, np.minimum, np.inf), (2 * k + 1, np.maximum, -np.inf)):
-                if dark is not None:
-                    np.copyto(decided, beyond, where=dark)
-                box[side, tiles] = least.reduce(decided, axis=1)
+        lit[tiles] = shown & owned[tiles]
+    # Unlit pixels keep the places of their neighbours in the lattice: no number that spreads.
+    points = np.empty((count, 2, 64))
+    box = np.empty((4, count))
+    partly = np.flatnonzero(~lit.all(axis=1))
+    for k in (0, 1):
+        decided = place[k] * (1 / DISPLACED.sample)
+        decided += SHIFT[k]
+        np.rint(decided, out=decided)
+        decided *= DISPLACED.sample
+        decided.min(axis=1, out=box[2 * k])
+        decided.max(axis=1, out=box[2 * k + 1])
+        some_lit, some_of = lit[partly], decided[partly]
+        box[2 * k, partly] = np.where(some_lit, some_of, np.inf).min(axis=1)
+        box[2 * k + 1, partly] = np.where(some_lit, some_of, -np.inf).max(axis=1)
+        points[:, k] = decided
     return Samples(place, points, lit, box, seen.reach[which])
-
-
-def _on_grid(place: FloatArray, shift: float) -> FloatArray:
-    """Places on the grid on which edges are decided, `shift` of its steps further."""
-    decided: FloatArray = place / DISPLACED.sample
-    decided += shift
-    np.rint(decided, out=decided)
-    decided *= DISPLACED.sample
-    return decided
 
 
 def _of_blocks(
@@ -101,33 +93,38 @@ def _of_blocks(
     offset = float(sample[0][at[0]]), float(sample[1][at[0]])
     d = view.rays(*patch_grid(patches, some, width, height, offset))
     matrix = seen.patch_from_eye[some]
-    q = [_along(matrix[:, k], d) for k in range(3)]
-    shown = np.broadcast_to(seen.sure[some][:, None, None], q[0].shape).copy()
+    shape = np.broadcast_shapes(d.shape[1:], (some.size, height, width))
+    q, part = np.empty((3, *shape)), np.empty(shape)
+    for k in range(3):
+        # Products summed in order, in memory that is there.
+        np.multiply(matrix[:, k, 0, None, None], d[0], out=q[k])
+        q[k] += np.multiply(matrix[:, k, 1, None, None], d[1], out=part)
+        q[k] += np.multiply(matrix[:, k, 2, None, None], d[2], out=part)
+    shown = np.broadcast_to(seen.sure[some][:, None, None], shape).copy()
     doubtful = np.flatnonzero(~seen.sure[some])
     if doubtful.size:
         centres = patch_grid(patches, some[doubtful], width, height)
         shown[doubtful] = view.lit(*centres)
-    lattice = np.stack(np.broadcast_arrays(np.arange(width), np.arange(height)[:, None])).astype(np.float64)
-    lattice += np.array(offset)[:, None, None]
     ahead = q[2] > 0
-    over = np.divide(1.0, q[2], out=np.ones_like(q[2]), where=ahead)
-    values = np.empty((2, *q[0].shape))
-    for k in (0, 1):
-        np.multiply(q[k], over, out=values[k])
+    if not ahead.all():
+        part[:] = 1.0
+    over = np.divide(1.0, q[2], out=part, where=ahead)
+    values = q[:2]
+    values *= over
+    shown_ahead = shown & ahead
+    with np.errstate(all="ignore"):
+        finite = bool(np.isfinite(values.sum()))
+    if not (finite and shown_ahead.all()):
         # Where there is no ray, or none through this side of the plane, whatever is near.
-        good = shown & ahead & np.isfinite(values[k])
-        values[k] = np.where(good, values[k], lattice[k])
+        columns, rows = np.arange(float(width)), np.arange(float(height))[:, None]
+        lattice = np.stack(np.broadcast_arrays(columns, rows))
+        lattice += np.array(offset)[:, None, None]
+        for k in (0, 1):
+            good = shown_ahead & np.isfinite(values[k])
+            np.copyto(values[k], lattice[k], where=~good)
+    if any(offset):
+        values -= np.array(offset)[:, None, None, None]
     tiles = canvas.tile_start[at][:, None] + np.arange(across * down)
-    values -= np.array(offset)[:, None, None, None]
     shaped = values.reshape(2, some.size, down, 8, across, 8).transpose(0, 1, 2, 4, 3, 5)
     lit = shown.reshape(some.size, down, 8, across, 8).transpose(0, 1, 3, 2, 4)
     return tiles.reshape(-1), shaped.reshape(2, -1, 64), lit.reshape(-1, 64)
-
-
-def _along(row: FloatArray, d: FloatArray) -> FloatArray:
-    """Row vectors (n, 3) times rays (3, n or 1, h, w), every sum in a fixed order."""
-    result: FloatArray = row[:, 0, None, None] * d[0]
-    term = row[:, 1, None, None] * d[1]
-    result += term
-    result += np.multiply(row[:, 2, None, None], d[2], out=term)
-    return result

@@ -17,7 +17,7 @@ from tests.helpers.photos import camera
 
 def errors(case, found):
     """Metres and degrees (K,) by which facets are off."""
-    bundle = found.adjusted.bundle.facets
+    bundle = found.motions
     turned = Rotation.from_rotvec(bundle[:, :3]) * Rotation.from_rotvec(case.turns).inv()
     return np.linalg.norm(bundle[:, 3:] - case.shifts, axis=1), np.degrees(turned.magnitude())
 

@@ -7,6 +7,7 @@ import pytest
 
 from quiltcli.calibration.panels.corners import COLUMNS, corner_table, fit_corners, read_corners
 from quiltcli.calibration.panels.display_files import moved_display, panel_angles
+from quiltcli.calibration.panels.distances import enlarged
 from quiltcli.calibration.panels.start import middles_of
 from quiltcli.calibration.pattern import corner_letter
 from quiltcli.display import load_display
@@ -44,15 +45,18 @@ def written(texts, folder):
     return load_display(load_display_file(folder / "fixed.yaml"))
 
 
-def test_moved_facets_come_back_with_their_rasters(display, tmp_path):
+@pytest.mark.parametrize("scale", [1.0, 1.0213])
+def test_moved_facets_come_back_with_their_rasters(display, tmp_path, scale):
     spec, facets = display
     rng = np.random.default_rng(1)
     turns, shifts = 0.1 * rng.normal(size=(2, facets.count, 3))
     from scipy.spatial.transform import Rotation
 
-    middles = middles_of(facets.corners, facets.corner_start)
-    texts = moved_display(spec, facets, Rotation.from_rotvec(turns).as_matrix(), middles, shifts, "fixed.obj")
-    found, should = written(texts, tmp_path), moved(facets, turns, shifts)
+    large = facets if scale == 1 else enlarged(facets, scale, np.array([0.1, 0.2, 0.3]))
+    middles = middles_of(large.corners, large.corner_start)
+    matrices = Rotation.from_rotvec(turns).as_matrix()
+    texts = moved_display(spec, large, matrices, middles, shifts, "fixed.obj", scale)
+    found, should = written(texts, tmp_path), moved(large, turns, shifts)
     assert found.names == facets.names
     np.testing.assert_array_equal(found.size, facets.size)
     np.testing.assert_array_equal(found.enabled, facets.enabled)

@@ -224,3 +224,33 @@ def test_a_skin_that_does_not_fit_names_its_mesh(tmp_path):
     path = stage(tmp_path / "a.usda", skinned(SKIN.replace("[0, 0, 1, 1]", "[0, 0, 1]")))
     with pytest.raises(MeshError, match="/root/square: has joint indices and weights"):
         read_usd_model(path).pose(0.5, Playing())
+
+
+def test_normals_of_a_skin_are_made_anew_and_stay_sharp_where_they_were(tmp_path):
+    # Two faces that fold over the edge from (1, 0, 0) to (1, 1, 0).
+    points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (2, 0, 0), (2, 1, 0)]
+    shape = SHAPE.replace("[(0, 0, 4)]", "[(0, 0, 1), (0, 0, 1)]").replace(
+        "pointIndices = [0]", "pointIndices = [4, 5]"
+    )
+    body = mesh(
+        points=points,
+        counts=[4, 4],
+        indices=[0, 1, 2, 3, 1, 4, 5, 2],
+        more=SKIN.replace("[0, 0, 1, 1]", "[0, 0, 0, 0, 0, 0]").replace("[1, 1, 1, 1]", "[1, 1, 1, 1, 1, 1]")
+        + shape
+        + "NORMALS",
+        meta='prepend apiSchemas = ["SkelBindingAPI"]',
+    )
+    smooth = 'normal3f[] normals = [(0, 0, 1)] (interpolation = "constant")'
+    sharp = (
+        f"normal3f[] normals = [{', '.join(['(0, 0, 1)'] * 4 + ['(0, 0.1, 1)'] * 4)}]"
+        ' (interpolation = "faceVarying")'
+    )
+    # Weights 1 of (0, 0, 1), and √2 / (√2² · 1²) of (-1, 0, 1) / √2.
+    for given, expected in ((smooth, [(-1, 0, 3)]), (sharp, [(-1, 0, 1), (0, 0, 1)])):
+        path = stage(tmp_path / "a.usda", SKELETON.replace("BODY", body.replace("NORMALS", given)))
+        vertices, normals = read_usd_model(path).pose(1, Playing())
+        edge = (np.abs(vertices - (1, 0, 0)) < 1e-6).all(axis=1)
+        found = sorted(normals[edge].tolist())
+        lengths = np.linalg.norm(expected, axis=1, keepdims=True)
+        np.testing.assert_allclose(found, np.array(expected) / lengths, atol=1e-6)

@@ -16,7 +16,7 @@ from quiltcli.job import load_job
 from quiltcli.render.ring import turn
 from quiltcli.render.ring.setup import set_ring_stage
 from quiltcli.render.ring.walk import RingOptions, render_turns
-from quiltcli.ring.picture import draw_picture
+from quiltcli.ring.picture import Picture, Show, draw_picture
 from quiltcli.ring.tones import tones_of
 from tests.helpers.ring_job import ring_job
 
@@ -112,6 +112,32 @@ def test_a_stopped_run_is_taken_up_again(
     records = render_turns(job, RingOptions(folder=tmp_path, workers=2, resume=True))
     assert [record.positions for record in records] == [24, 48]
     assert packed(tmp_path) == packed(whole)
+
+
+def test_light_that_a_stopped_run_has_written_is_not_drawn_again(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job, usual, drawn = load_job(whole.parent / "job.yaml"), turn.draw_picture, []
+
+    def dying(show: Show, angle: float, side: int = 0) -> Picture:
+        drawn.append(angle)
+        if len(drawn) == 21:
+            raise KeyboardInterrupt
+        return usual(show, angle, side)
+
+    monkeypatch.setattr(turn, "draw_picture", dying)
+    with pytest.raises(KeyboardInterrupt):
+        render_turns(job, RingOptions([3], tmp_path, workers=1))
+    assert not any((tmp_path / "packed").iterdir())
+    (tmp_path / "tones" / "turn_0001.0004.exr").write_bytes(b"damaged")
+    (record,) = render_turns(job, RingOptions([3], tmp_path, workers=1, resume=True))
+    # Twenty were there, one of them has been spoilt since: 48 − 19, and the one at which the first run ended.
+    assert len(drawn) == 21 + 29
+    assert record.positions == 48
+    wanted = {name: data for name, data in packed(whole).items() if name in packed(tmp_path)}
+    assert packed(tmp_path) == wanted
+    for path in (tmp_path / "tones").iterdir():
+        assert path.read_bytes() == (whole / "tones" / path.name).read_bytes()
 
 
 def test_a_changed_job_is_drawn_again(whole: Path, tmp_path: Path) -> None:
