@@ -17,20 +17,25 @@ from quiltcli.ring.plane import through_mirror, viewer_along
 from quiltcli.ring.rig import Pose
 
 _STEPS = 6
+_ON_CIRCLE = 5
 _SECANTS = 24
 
 
-def viewer_of(pose: Pose, curve: Curve, mirror: FloatArray) -> FloatArray:
+def viewer_of(pose: Pose, curve: Curve, mirror: FloatArray, nodes: FloatArray | None = None) -> FloatArray:
     """V′ (3, ...) of the pixels that light points M (3, ...) of the mirror, in the frame from P′.
 
-    Newton's method for (V(A) − M)·a = (i·a) |V(A) − M|, from the viewer of the plane on.
+    Newton's method for (V(A) − M)·a = (i·a) |V(A) − M|, from the viewer of the plane on, which may be found
+    from `nodes` as `plane.nodes_of` has them.
     """
-    turn = _turn(pose, viewer_along(pose, curve, mirror[1] / mirror[0]))
     share = mirror[1] / np.sqrt(mirror[0] ** 2 + mirror[1] ** 2 + mirror[2] ** 2)
+    start = viewer_along(pose, curve, mirror[1] / mirror[0], nodes)
+    if curve.is_circle:
+        return _on_circle(pose, curve, mirror, share, start)
+    turn = _turn(pose, start)
     e0, f0, y0 = pose.origin
     for _ in range(_STEPS):
         azimuth = pose.angle - turn
-        (distance, height), (along, up) = curve.at(azimuth), curve.slopes(azimuth)
+        distance, height, along, up = curve.at_and_slopes(azimuth)
         c, s = np.cos(turn), np.sin(turn)
         x, y, z = distance * c - e0 - mirror[0], distance * s - f0 - mirror[1], height - y0 - mirror[2]
         length = np.sqrt(x * x + y * y + z * z)
@@ -38,6 +43,36 @@ def viewer_of(pose: Pose, curve: Curve, mirror: FloatArray) -> FloatArray:
         rate = dy - share * (x * dx + y * dy + z * dz) / length
         turn = turn - (y - share * length) / rate
     return _place(pose, curve, turn)
+
+
+def _on_circle(
+    pose: Pose, curve: Curve, mirror: FloatArray, share: FloatArray, start: FloatArray
+) -> FloatArray:
+    """As `viewer_of`, on a circle: with cosine and sine for the angle, which rational turns keep of length 1.
+
+    A step by δ turns them by 2 atan(δ/2): Newton's method comes to the same end, and takes no sine.
+    """
+    e0, f0, y0 = pose.origin
+    c, s = (start[0] + e0) / curve.distance, (start[1] + f0) / curve.distance
+    left, beside, up = e0 + mirror[0], f0 + mirror[1], curve.height - y0 - mirror[2]
+    up2 = up * up
+    for _ in range(_ON_CIRCLE):
+        x, y = curve.distance * c, curve.distance * s
+        x -= left
+        y -= beside
+        length = np.sqrt(x * x + y * y + up2)
+        # The half of what is off, over how it changes: d (c − share (y c − x s) / length).
+        rate = c - share * (y * c - x * s) / length
+        rate *= 2 * curve.distance
+        length *= share
+        y -= length
+        half = np.divide(y, rate, out=y)
+        square = half * half
+        scale = 1 / (1 + square)
+        turned = (1 - square) * scale
+        half *= 2 * scale
+        c, s = c * turned + s * half, s * turned - c * half
+    return np.stack((curve.distance * c - e0, curve.distance * s - f0, np.full(c.shape, curve.height - y0)))
 
 
 def viewer_through(pose: Pose, curve: Curve, points: FloatArray) -> FloatArray:

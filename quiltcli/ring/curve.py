@@ -54,22 +54,25 @@ class Curve:
 
     def at(self, azimuth: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Distance and height at azimuths."""
-        distance = np.full(np.shape(azimuth), float(self.distance))
-        height = np.full(np.shape(azimuth), float(self.height))
-        for user in self.users:
-            share, _ = _share(user, azimuth)
-            distance += share * (user.distance - self.distance)
-            height += share * (user.height - self.height)
-        return distance, height
+        return self.at_and_slopes(azimuth)[:2]
 
     def slopes(self, azimuth: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Derivatives of distance and height by azimuth, metres a radian."""
-        distance, height = np.zeros(np.shape(azimuth)), np.zeros(np.shape(azimuth))
+        return self.at_and_slopes(azimuth)[2:]
+
+    def at_and_slopes(self, azimuth: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Distance, height, and the derivatives of both: `at` and `slopes` in one go."""
+        distance = np.full(np.shape(azimuth), float(self.distance))
+        height = np.full(np.shape(azimuth), float(self.height))
+        along, up = np.zeros(np.shape(azimuth)), np.zeros(np.shape(azimuth))
         for user in self.users:
-            _, slope = _share(user, azimuth)
-            distance += slope * (user.distance - self.distance)
-            height += slope * (user.height - self.height)
-        return distance, height
+            share, slope = _share(user, azimuth)
+            nearer, higher = user.distance - self.distance, user.height - self.height
+            distance += share * nearer
+            height += share * higher
+            along += slope * nearer
+            up += slope * higher
+        return distance, height, along, up
 
     def points(self, azimuth: FloatArray) -> FloatArray:
         """V (..., 3) at azimuths, world metres."""

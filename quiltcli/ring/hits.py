@@ -6,6 +6,8 @@ lights stand where they do; rays are each pixel's own, so that whatever depends 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from quiltcli.geometry import FloatArray, IntArray
@@ -20,7 +22,32 @@ from quiltcli.visibility.resolve.vectors import PointVectors
 EYE = np.zeros(3)
 
 
-def ring_hits(pose: Pose, mesh: Mesh, scene: Scene, seen: Visible, part: slice, address: IntArray) -> Hits:
+@dataclass(frozen=True)
+class Cell:
+    """The part of a pixel that a sample stands for, over which textures are filtered.
+
+    Attributes:
+        middle: from the sample, pixels.
+        size: across and down, pixels.
+    """
+
+    middle: tuple[float, float] = (0.0, 0.0)
+    size: tuple[float, float] = (1.0, 1.0)
+
+
+WHOLE = Cell()
+"""All of the pixel, whose centre is looked at."""
+
+
+def ring_hits(
+    pose: Pose,
+    mesh: Mesh,
+    scene: Scene,
+    seen: Visible,
+    part: slice,
+    address: IntArray,
+    cell: Cell = WHOLE,
+) -> Hits:
     """Hits of some of the pixels that see something.
 
     Args:
@@ -30,6 +57,7 @@ def ring_hits(pose: Pose, mesh: Mesh, scene: Scene, seen: Visible, part: slice, 
         seen: what the pixels see.
         part: which of them.
         address: (P,) where these lie in the picture.
+        cell: what of its pixel each of them stands for.
     """
     pixel, triangle = seen.pixel[part], seen.triangle[part]
     weights, s = met(mesh, seen, pixel, triangle)
@@ -53,11 +81,13 @@ def ring_hits(pose: Pose, mesh: Mesh, scene: Scene, seen: Visible, part: slice, 
         weights=weights.astype(np.float32)[:, :, None],
         position=world[:, :, None],
         inside=pixel.size,
-        edges=None if scene.textures is None else _edges(mesh, seen, pixel, triangle, weights),
+        edges=None if scene.textures is None else _edges(mesh, seen, pixel, triangle, weights, cell),
     )
 
 
-def _edges(mesh: Mesh, seen: Visible, pixel: IntArray, triangle: IntArray, weights: FloatArray) -> PointEdges:
+def _edges(
+    mesh: Mesh, seen: Visible, pixel: IntArray, triangle: IntArray, weights: FloatArray, cell: Cell
+) -> PointEdges:
     """What textures are filtered by: how weights change to the neighbouring pixels' rays.
 
     Every pixel has a viewpoint of its own, so no plane over the picture says it; the ray of the neighbour,
@@ -74,6 +104,9 @@ def _edges(mesh: Mesh, seen: Visible, pixel: IntArray, triangle: IntArray, weigh
                 beside, _ = met(mesh, seen, pixel + way * step, triangle)
             # Beyond the horizon there is nothing to filter by.
             slopes[:, axis] = np.nan_to_num((beside - weights) * way, posinf=0.0, neginf=0.0)
+    if cell != WHOLE:
+        weights = weights + slopes[:, 0] * cell.middle[0] + slopes[:, 1] * cell.middle[1]
+        slopes *= np.array(cell.size)[:, None]
     return PointEdges(triangle.astype(np.int32), weights, slopes)
 
 

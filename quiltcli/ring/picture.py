@@ -17,7 +17,7 @@ from quiltcli.lightfield import Field
 from quiltcli.projection.gaze import Gaze
 from quiltcli.ring.cast import lines_of
 from quiltcli.ring.curve import Curve
-from quiltcli.ring.hits import EYE, ring_hits
+from quiltcli.ring.hits import EYE, WHOLE, Cell, ring_hits
 from quiltcli.ring.outline import lit_pixels
 from quiltcli.ring.raster import Limits, Mesh, Visible, see
 from quiltcli.ring.rebin import rebinned
@@ -25,6 +25,7 @@ from quiltcli.ring.rig import Pose, Rig
 from quiltcli.scene import Scene
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill, light_at_points
+from quiltcli.shading.shadows import CENTRE, Sample
 from quiltcli.shading.sky import sky_at
 from quiltcli.viewer.viewer import Viewer
 
@@ -43,6 +44,7 @@ class Show:
         mesh: its triangles.
         channels: names of the channels.
         samples: places of the samples in a pixel, from its centre; the centre alone where there is one.
+        cells: what of the pixel each stands for.
         backface_culling: leave out what is seen from behind.
         near: nearest that is drawn, metres.
         far: farthest that is drawn, metres.
@@ -57,6 +59,7 @@ class Show:
     mesh: Mesh
     channels: tuple[str, ...]
     samples: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    cells: tuple[Cell, ...] = (WHOLE,)
     backface_culling: bool = False
     near: float = 0.01
     far: float = 2.0
@@ -129,8 +132,9 @@ class Picture:
     counts: Counts
 
     def rgb(self) -> NDArray[np.float16]:
-        """(H, W, 3) light."""
-        return np.stack([self.buffers[name] for name in "RGB"], axis=-1).reshape(*self.lit.shape, 3)
+        """(H, W, 3) light, a channel after another in memory."""
+        light = np.stack([self.buffers[name] for name in "RGB"]).reshape(3, *self.lit.shape)
+        return np.moveaxis(light, 0, -1)
 
 
 def draw_picture(show: Show, angle: float, side: int = 0) -> Picture:
@@ -202,11 +206,12 @@ def _samples(
     hits = np.zeros(lit.size, dtype=np.uint16)
     sums = {name: [np.zeros(lit.size, dtype=np.float32) for _ in range(3)] for name in channels}
     counts = Counts()
-    for sample in show.samples:
-        seen, address, some = _look(show, pose, lit, sample)
+    for number, (place, cell) in enumerate(zip(show.samples, show.cells, strict=True)):
+        seen, address, some = _look(show, pose, lit, place)
+        sample = Sample(number, len(show.samples))
         counts.add(some)
         for part in slices(0, seen.pixel.size, _CHUNK):
-            shaded = _shaded(show, pose, seen, address, part)
+            shaded = _shaded(show, pose, seen, address, part, cell, sample)
             pixel = address[part]
             hits[pixel] += 1
             for name in channels:
@@ -246,6 +251,14 @@ def _look(
     return found, address[kept], counts
 
 
-def _shaded(show: Show, pose: Pose, seen: Visible, address: IntArray, part: slice) -> Shaded:
-    hits = ring_hits(pose, show.mesh, show.scene, seen, part, address[part])
-    return Shaded(show.scene, EYE, hits)
+def _shaded(
+    show: Show,
+    pose: Pose,
+    seen: Visible,
+    address: IntArray,
+    part: slice,
+    cell: Cell = WHOLE,
+    sample: Sample = CENTRE,
+) -> Shaded:
+    hits = ring_hits(pose, show.mesh, show.scene, seen, part, address[part], cell)
+    return Shaded(show.scene, EYE, hits, sample=sample)

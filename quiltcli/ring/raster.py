@@ -23,9 +23,12 @@ from quiltcli.ring.rays import RayTable, Window, window_rays
 from quiltcli.ring.rig import Pose
 from quiltcli.visibility.setup.planes import LATTICE
 
-_SIDES = (1, 2, 3, 4, 6, 8)
-_TILE = _SIDES[-1]
-_CHUNK = 8192
+_SIDES = (1, 2, 3, 4, 5, 6, 8, 10, 12)
+"""Widths and heights of boxes that are tried together; larger ones are cut into tiles."""
+_TILE = 6
+_CHUNK = 24576
+"""Pairs of pixel and triangle at a time: few enough for a core's cache, many for a call of numpy."""
+_VERTICES = 16384
 
 
 @dataclass(frozen=True)
@@ -171,8 +174,8 @@ def in_frame(pose: Pose, vertices: FloatArray) -> FloatArray:
 def _pixels(pose: Pose, curve: Curve, corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The pixels (V,) that show points (3, V): as `forward`, chunk by chunk."""
     x, y = np.empty(corners.shape[1]), np.empty(corners.shape[1])
-    for start in range(0, corners.shape[1], 2 * _CHUNK):
-        part = slice(start, start + 2 * _CHUNK)
+    for start in range(0, corners.shape[1], _VERTICES):
+        part = slice(start, start + _VERTICES)
         points = corners[:, part]
         viewer = (
             viewer_through(pose, curve, points)
@@ -185,7 +188,7 @@ def _pixels(pose: Pose, curve: Curve, corners: FloatArray) -> tuple[FloatArray, 
 
 def _tries(boxes: Boxes, window: Window) -> Iterator[tuple[IntArray, IntArray]]:
     """Triangles (N,) and pixels of the window (k, N) to try them at, N·k at most some thousands."""
-    large = np.flatnonzero((boxes.width > _TILE) | (boxes.height > _TILE))
+    large = np.flatnonzero((boxes.width > _SIDES[-1]) | (boxes.height > _SIDES[-1]))
     small = np.ones(boxes.triangle.size, dtype=np.bool_)
     small[large] = False
     sizes = np.array(_SIDES)

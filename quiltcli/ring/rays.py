@@ -14,7 +14,7 @@ import numpy as np
 from quiltcli.geometry import FloatArray, IntArray, slices
 from quiltcli.ring.cone import viewer_of
 from quiltcli.ring.curve import Curve
-from quiltcli.ring.plane import on_mirror, viewer_along
+from quiltcli.ring.plane import nodes_of, on_mirror, viewer_along
 from quiltcli.ring.rig import Pose
 
 _ROWS = 16384
@@ -72,18 +72,21 @@ class RayTable:
         return np.stack((s, along, self.kappa[ray] + self.m[ray] * s))
 
 
-def rays_at(pose: Pose, curve: Curve, x: FloatArray, y: FloatArray) -> RayTable:
-    """The rays of pixels (P,) at any places of the picture."""
+def rays_at(
+    pose: Pose, curve: Curve, x: FloatArray, y: FloatArray, nodes: FloatArray | None = None
+) -> RayTable:
+    """The rays of pixels (P,) at any places of the picture; `nodes` as `plane.nodes_of` has them."""
     mirror = on_mirror(pose, x, y)
+    nodes = nodes_of(pose, curve) if nodes is None else nodes
     if pose.cone:
-        viewer = np.round(viewer_of(pose, curve, mirror) * _GRID) / _GRID
+        viewer = np.round(viewer_of(pose, curve, mirror, nodes) * _GRID) / _GRID
         out = viewer - mirror
         b, m = out[1] / out[0], out[2] / out[0]
         eta = mirror[1] - b * mirror[0]
         kappa = mirror[2] - m * mirror[0]
         return RayTable(b, m, kappa, eta * m - kappa * b, eta, viewer[0])
     b = mirror[1] / mirror[0]
-    viewer = viewer_along(pose, curve, b)
+    viewer = viewer_along(pose, curve, b, nodes)
     end, height = viewer[0], viewer[2]
     if not curve.is_circle:
         end, height = (np.round(part * _GRID) / _GRID for part in (end, height))
@@ -98,11 +101,12 @@ def window_rays(pose: Pose, curve: Curve, window: Window, beside: tuple[float, f
     b, m, kappa, omega, end = np.empty((5, size))
     found = RayTable(b, m, kappa, omega, np.empty(size) if pose.cone else None, end)
     column = np.arange(window.width) + (window.x + 0.5 + beside[0])
+    nodes = nodes_of(pose, curve)
     rows = max(1, _ROWS // max(window.width, 1))
     for part in slices(0, window.height, rows):
         row = np.arange(part.start, part.stop) + (window.y + 0.5 + beside[1])
         x, y = np.tile(column, row.size), row.repeat(window.width)
-        some = rays_at(pose, curve, x, y)
+        some = rays_at(pose, curve, x, y, nodes)
         here = slice(part.start * window.width, part.stop * window.width)
         for name in ("b", "m", "kappa", "omega", "eta", "end"):
             values = getattr(some, name)

@@ -49,13 +49,14 @@ def tones_of(rig: Rig, pictures: Sequence[Picture], spec: HalftoneSpec, shortest
     shape = (rig.size[1], rig.size[0])
     values, inside = np.zeros((len(rig.streams), *shape), dtype=np.float32), np.zeros(shape, dtype=np.bool_)
     for number, picture in enumerate(pictures):
-        rgb = picture.rgb()[picture.lit]
+        rgb = picture.rgb()
         if len(rig.streams) > 1:
-            values[:, picture.lit] = rgb.T
+            np.copyto(values, np.moveaxis(rgb, -1, 0), where=picture.lit)
         elif plain:
-            values[0, picture.lit] = luminance(rgb)
+            np.copyto(values[0], luminance(rgb), where=picture.lit)
         else:
-            values[0, picture.lit] = mixed(rgb, filters)[:, number] * np.float32(white_gain(filters))
+            shares = mixed(rgb[picture.lit], filters)[:, number]
+            values[0, picture.lit] = shares * np.float32(white_gain(filters))
         inside |= picture.lit
     time, exposure = None, spec.exposure
     if spec.compensate == "dwell":

@@ -59,6 +59,14 @@ def test_check_finds_nothing_wrong_and_says_what_is_worth_a_word(job: Path, tmp_
     assert run.exit_code == 0
     assert "cover 37.5° of 360°" in run.output
     assert "a turn begins within a picture" in run.output
+    assert "pixels off" not in run.output
+    for how, told in (("plane", True), ("cone", False)):
+        ring_job(tmp_path, size=768, positions=288, more="", lobe=f"1.25, reflection: {how}")
+        assert ("drawn 0.55 pixels off" in quilt("check", tmp_path / "job.yaml").output) == told
+    data = json.loads(quilt("info", job, "--json").output)
+    assert data["plane_error"] == pytest.approx(0.55 * 48 / 768, rel=0.05)
+    (entry,) = json.loads((job.with_name("out") / "report.json").read_text())["frames"]
+    assert entry["plane_error"][0]["pixels"] == data["plane_error"]
 
 
 @pytest.mark.parametrize(

@@ -133,7 +133,7 @@ def _measure(
                 results.setdefault("sequences", []).append(one)
                 keep(f"sequence, {compression}")
         if "rings" in parts:
-            results["rings"] = rings.measure(1 if quick else 4, whole=not quick)
+            results["rings"] = rings.measure(1 if quick else 4, rings.QUICK if quick else 288)
             keep("rings")
         made = results.setdefault("curves", {})
         if "facets" in parts:

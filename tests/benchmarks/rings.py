@@ -18,14 +18,14 @@ import click
 import numpy as np
 
 from quiltcli.geometry import Float32Array, FloatArray, Int32Array
-from quiltcli.job import load_job, load_scene_file
-from quiltcli.render.ring.walk import RingOptions, render_turns
+from quiltcli.job import load_scene_file
 from quiltcli.ring.cast import Target, aim_at, see_by_rays
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.raster import Mesh, mesh_of, see
 from quiltcli.ring.rays import Window, window_rays
 from quiltcli.ring.rig import Pose, ideal_projector
 from quiltcli.scene.load import load_scene
+from tests.benchmarks.turns import whole_turn
 
 SIZE = (768, 768)
 RING = Curve(0.4, 1.0)
@@ -36,6 +36,10 @@ SETTLED = 0.4
 """Most that they may take of the time of settled rays."""
 TURN = 1.5
 """Most that a whole turn by two workers may take of the time of its visibility by one process."""
+MEMORY = 2.5e9
+"""Most memory of all processes of a turn, bytes."""
+QUICK = 48
+"""Positions of a turn where time is short."""
 
 
 @dataclass(frozen=True)
@@ -125,30 +129,6 @@ def visibility(name: str, mesh: Mesh, rounds: int) -> Row:
     return Row(name, mesh.count, times["exact"] / rounds, times["embree"] / rounds, times["settled"])
 
 
-def whole_turn(vertices: FloatArray, triangles: Int32Array, positions: int) -> tuple[float, float]:
-    """Wall seconds of a turn by two workers, and of its visibility by one process."""
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices]
-        lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in triangles]
-        (folder / "mesh.obj").write_text("\n".join(lines) + "\n")
-        (folder / "turn.yaml").write_text(
-            "quilt_display: 1\nkind: lightfield360\nprojector: {height: 0.6, diameter: 0.13}\n"
-            f"mirror: {{outline: {{disk: 0.13}}}}\nrotation: {{positions: {positions}}}\n"
-        )
-        (folder / "job.yaml").write_text(
-            "quilt_job: 1\ndisplay: turn.yaml\nscene: mesh.obj\nframes: 1\nring: {height: 0.4, distance: 1}\n"
-        )
-        start = time.perf_counter()
-        render_turns(load_job(folder / "job.yaml"), RingOptions(workers=2))
-        whole = time.perf_counter() - start
-    mesh, projector = mesh_of(vertices, triangles), ideal_projector(SIZE, 0.6, 0.13)
-    start = time.perf_counter()
-    for number in range(positions):
-        see(Pose(2 * math.pi * number / positions, math.pi / 4, 0.0, projector), RING, mesh, SIZE)
-    return whole, time.perf_counter() - start
-
-
 def table(rows: Iterable[Row]) -> Iterator[str]:
     """Lines of a table."""
     yield "| mesh | triangles | edge functions | one ray a pixel | settled rays | of one ray | of settled |"
@@ -160,39 +140,50 @@ def table(rows: Iterable[Row]) -> Iterator[str]:
         yield f"| {row.name} | {row.triangles:,} | {times} | {first} | {second} |"
 
 
-def measure(
-    rounds: int, *, whole: bool, paths: tuple[Path, ...] = (), positions: int = 288
-) -> dict[str, Any]:
-    """Visibility of meshes, and a whole turn of the first, as plain data."""
+def measure(rounds: int, positions: int = 288, paths: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Visibility of meshes, and whole turns of so many positions, as plain data."""
     shapes = [(path.stem, *read(path)) for path in paths]
     shapes += [] if paths else [(f"ball {count // 1000}K", *bumpy_ball(count)) for count in COUNTS]
     rows = [visibility(name, mesh_of(points, faces), rounds) for name, points, faces in shapes]
-    found: dict[str, Any] = {"visibility": [asdict(row) | {"limit": row.limit} for row in rows]}
-    if whole:
-        name, points, faces = shapes[0]
-        turn, seen = whole_turn(points, faces, positions)
-        found["turn"] = {"name": name, "whole": turn, "seen": seen, "positions": positions}
+    found: dict[str, Any] = {"visibility": [asdict(row) | {"limit": row.limit} for row in rows], "turns": []}
+    for name, points, faces in shapes if positions else ():
+        with tempfile.TemporaryDirectory() as scratch:
+            found["turns"].append({"name": name, **whole_turn(points, faces, positions, Path(scratch))})
     return found
+
+
+def shares(turn: Mapping[str, Any]) -> dict[str, float]:
+    """What a turn by two workers takes of its visibility by one, by the clock.
+
+    In processor time both workers count half, as if neither waited: what a machine with other work would do.
+    """
+    return {
+        "wall": turn["whole"]["wall"] / turn["seen"]["wall"],
+        "cpu": turn["whole"]["cpu"] / 2 / turn["seen"]["cpu"],
+    }
 
 
 def told(found: Mapping[str, Any]) -> Iterator[str]:
     """What was measured, as lines."""
     rows = [{key: value for key, value in row.items() if key != "limit"} for row in found["visibility"]]
     yield from table(Row(**row) for row in rows)
-    if turn := found.get("turn"):
-        share = f"{turn['whole'] / turn['seen']:.2f} of its visibility by one (≤ {TURN:g})"
-        by = f"{turn['whole']:.1f} s by two workers"
-        yield f"a turn of {turn['positions']}, {turn['name']}: {by}, {share}, {turn['seen']:.1f} s"
+    for turn in found["turns"]:
+        share = shares(turn)
+        yield (
+            f"a turn of {turn['positions']}, {turn['name']}: {turn['whole']['wall']:.1f} s by two workers,"
+            f" {share['wall']:.2f} of its visibility by one ({turn['seen']['wall']:.1f} s; ≤ {TURN:g}),"
+            f" {share['cpu']:.2f} in processor time; {turn['memory'] / 1e9:.2f} GB (≤ {MEMORY / 1e9:g})"
+        )
 
 
 @click.command(help=__doc__)
-@click.option("--quick", is_flag=True, help="One round, no whole turn.")
-@click.option("--positions", default=288, help="Of the whole turn.")
+@click.option("--quick", is_flag=True, help="One round, turns of 48 positions.")
+@click.option("--positions", type=click.IntRange(0), help="Of whole turns; 0 for none.")
 @click.argument("paths", nargs=-1, type=click.Path(exists=True, path_type=Path))
-def main(quick: bool, positions: int, paths: tuple[Path, ...]) -> None:
+def main(quick: bool, positions: int | None, paths: tuple[Path, ...]) -> None:
     """Measure and print."""
-    found = measure(1 if quick else 4, whole=not quick, paths=paths, positions=positions)
-    click.echo("\n".join(told(found)))
+    count = (QUICK if quick else 288) if positions is None else positions
+    click.echo("\n".join(told(measure(1 if quick else 4, count, paths))))
 
 
 if __name__ == "__main__":

@@ -46,14 +46,20 @@ def measure(mesh: Mesh, frames: int, compression: str, folder: Path) -> dict[str
     job = _write_job(mesh, frames, compression, folder)
     command = [sys.executable, "-m", "tests.benchmarks.sequence", str(job)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2]) as process:
-        peak = 0
-        while process.poll() is None:
-            peak = max(peak, sum(map(_memory, [process.pid, *children(process.pid)])))
-            time.sleep(0.05)
+        peak = memory_of_all(process)
         said = process.communicate()[0]
     if process.returncode:
         raise SystemExit(f"the sequence ended with code {process.returncode}")
     return {"frames": frames, "compression": compression, "memory": peak, **json.loads(said)}
+
+
+def memory_of_all(process: subprocess.Popen[bytes]) -> int:
+    """The most bytes of a process and its children at any time until it ends."""
+    peak = 0
+    while process.poll() is None:
+        peak = max(peak, sum(map(_memory, [process.pid, *children(process.pid)])))
+        time.sleep(0.05)
+    return peak
 
 
 def _write_job(mesh: Mesh, frames: int, compression: str, folder: Path) -> Path:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tests.benchmarks import rings
 from tests.benchmarks.moving import EARLY
 from tests.benchmarks.race import ratio
 from tests.benchmarks.shadowed import cost
@@ -67,8 +68,11 @@ def _rings(found: Mapping[str, Any]) -> Iterator[Target]:
             f"visibility, edge functions {_EMBREE}", name, row["exact"] / row["embree"], row["limit"]
         )
         yield Target("visibility, edge functions / settled rays", name, row["exact"] / row["settled"], 0.4)
-    if turn := found.get("turn"):
-        yield Target("a turn, 2 workers / its visibility, 1", turn["name"], turn["whole"] / turn["seen"], 1.5)
+    for turn in found.get("turns", ()):
+        share, name = rings.shares(turn), f"{turn['name']}, {turn['positions']} positions"
+        yield Target("a turn, 2 workers / its visibility, 1", name, share["wall"], rings.TURN)
+        yield Target("the same in processor time, halved", name, share["cpu"], rings.TURN)
+        yield Target("memory of a turn", name, turn["memory"] / 1e9, rings.MEMORY / 1e9, " GB")
 
 
 def _worst(what: str, values: Mapping[str, float], limit: float) -> Iterator[Target]:

@@ -40,7 +40,7 @@ def ring_job(
     *,
     size: int = 48,
     positions: int = 24,
-    lobe: float = 1.25,
+    lobe: float | str = 1.25,
     frames: str = "1",
     method: str = "exact",
     tones: bool = False,

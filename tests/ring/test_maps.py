@@ -10,8 +10,11 @@ import pytest
 
 from quiltcli.geometry import FloatArray, dot, rotation_deg
 from quiltcli.ring.curve import Curve, User, overlapping
+from quiltcli.ring.elevation import plane_error
 from quiltcli.ring.maps import backward, forward
+from quiltcli.ring.plane import nodes_of, viewer_along
 from quiltcli.ring.rig import Pose, ideal_projector
+from tests.helpers.ring_scenes import rig
 
 SIZE = (768, 768)
 HEIGHT, DIAMETER = 0.6, 0.13
@@ -130,6 +133,7 @@ def test_planes_are_off_as_the_elevation_grows(
         u, v, _ = forward(pose(0.4, cone=True), curve, pose(0.4).from_world(points).T)
         off.append(np.hypot(x - u, y - v))
     assert np.sqrt(np.mean(off[0] ** 2)) == pytest.approx(rms, rel=0.05)
+    assert plane_error(rig(SIZE), *viewer) == pytest.approx(rms, rel=0.05, abs=0.001)
     assert max(off[0].max(), off[1].max()) == pytest.approx(worst, rel=0.05, abs=0.006)
     y, x = np.mgrid[:768:6, :768:6].reshape(2, -1) + 0.5
     x, y = (part[np.hypot(x - 384, y - 384) < 384] for part in (x, y))
@@ -172,6 +176,20 @@ def test_a_curve_is_met_in_its_plane_on_the_far_side(aside: bool) -> None:
     still = backward(mirror, Curve(0.4, 1.0), x, y)
     same = backward(mirror, Curve(0.4, 1.0, (User(0.5, 0.4, 1.0, 0.1, 0.2),)), x, y)
     assert np.abs(still.viewer - same.viewer).max() < 1e-14
+
+
+@pytest.mark.parametrize("aside", [False, True])
+def test_angles_between_nodes_are_those_found_alone(aside: bool) -> None:
+    """Also of planes steeper than there are nodes for; to the last bits, whichever others are asked for."""
+    mirror, rng = pose(1.3, aside=aside), np.random.default_rng(4)
+    curve = Curve(0.4, 1.5, tuple(User(a, 0.1, 1.3, hold=0.1, blend=0.6) for a in (0.5, 1.4)))
+    nodes = nodes_of(mirror, curve)
+    b = np.concatenate((rng.uniform(-0.5, 0.5, 4000), [-0.7, 0.6, 0.5, -0.5]))
+    near = viewer_along(mirror, curve, b, nodes)
+    alone = viewer_along(mirror, curve, b)
+    assert np.abs(near - alone).max() < 1e-14
+    assert np.array_equal(viewer_along(mirror, curve, b[::7], nodes), near[:, ::7])
+    assert nodes_of(mirror, Curve(0.4, 1.0)) is None
 
 
 def test_curves_that_a_plane_meets_twice_are_found() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,11 @@ import pytest
 from quiltcli.formats.png import save_png
 from quiltcli.job import load_job
 from quiltcli.render.ring.setup import set_ring_stage
+from quiltcli.ring.hits import WHOLE, Cell, met, ring_hits
 from quiltcli.ring.maps import backward
 from quiltcli.ring.picture import draw_picture
+from quiltcli.ring.raster import see
+from quiltcli.visibility.resolve.footprints import PointEdges
 from tests.helpers.ring_job import ring_job
 
 # A wall through the axis, seen from +Z.
@@ -80,3 +84,28 @@ def test_fine_patterns_are_filtered_and_do_not_alias(tmp_path: Path) -> None:
     inner[36:60, 36:60] = True
     assert light[inner].mean() == pytest.approx(0.5, abs=0.02)
     assert light[inner].std() < 0.05
+
+
+def test_a_sample_looks_textures_up_in_the_middle_of_its_cell_and_over_it(tmp_path: Path) -> None:
+    """Where the ray through the cell's middle meets the triangle; slopes go over the cell, not the pixel."""
+    stage = set_ring_stage(load_job(textured(tmp_path, np.zeros((4, 4, 3), np.uint8))))
+    show, pose = stage.show(1), stage.rig.at(1.2)
+    place, cell = (0.125, -0.375), Cell((-0.0625, 0.125), (0.25, 0.5))
+    seen, there = (
+        see(pose, show.curve, show.mesh, (96, 96), beside=(place[0] + x, place[1] + y))
+        for x, y in ((0.0, 0.0), cell.middle)
+    )
+    every = np.arange(seen.pixel.size)
+    whole, part = (
+        ring_hits(pose, show.mesh, show.scene, seen, slice(None), every, one).edges for one in (WHOLE, cell)
+    )
+    assert isinstance(whole, PointEdges)
+    assert isinstance(part, PointEdges)
+    assert np.array_equal(part.slopes[:, 0], whole.slopes[:, 0] / 4)
+    assert np.array_equal(part.slopes[:, 1], whole.slopes[:, 1] / 2)
+    both = np.isin(seen.pixel, there.pixel) & (seen.window == there.window)
+    wanted, _ = met(show.mesh, replace(seen, rays=there.rays), seen.pixel[both], seen.triangle[both])
+    assert both.sum() > 2000
+    # What is left is how the map bends within a pixel.
+    assert np.abs(part.known[:, both] - wanted).max() < 0.01 * np.abs(whole.slopes).max()
+    assert np.abs(whole.known[:, both] - wanted).max() > 0.1 * np.abs(whole.slopes).max()

@@ -19,6 +19,7 @@ from quiltcli.job.frames import format_frames
 from quiltcli.job.load import load_mirror_file
 from quiltcli.job.mirror import KIND
 from quiltcli.ring.build import rig_of
+from quiltcli.ring.elevation import plane_error
 from quiltcli.ring.outline import lit_pixels
 from quiltcli.ring.rig import Pose, Rig
 from quiltcli.ring.seen import slices_seen
@@ -105,8 +106,12 @@ def ring_job_info(path: Path, job: JobFile) -> Info:
         "packed": turns * -(-rig.positions // display.packing.images) * len(rig.streams),
         "sha256": job_sha256(job),
     }
-    lines = [
-        *value_lines(values),
+    lines = list(value_lines(values))
+    if job.ring is not None and not rig.cone:
+        off = plane_error(rig, job.ring.distance, job.ring.height)
+        data["plane_error"] = off
+        lines.append(("planes are off by", f"{off:.2g} pixels rms on the ring (0 with reflection: cone)"))
+    lines += [
         ("length", f"{counted(turns, 'turn')}, {counted(int(data['positions']), 'mirror position')}"),
         ("files", counted(int(data["packed"]), "packed picture")),
         ("hash", str(data["sha256"])),

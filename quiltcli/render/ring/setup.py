@@ -14,10 +14,12 @@ from quiltcli.job.load import load_mirror_file
 from quiltcli.job.mirror import MirrorDisplayFile
 from quiltcli.job.ring import RingSpec
 from quiltcli.lightfield import Field, load_field
-from quiltcli.render.antialiasing import sample_places
+from quiltcli.render.antialiasing import cell_of, sample_places
 from quiltcli.render.setup import texture_limits
 from quiltcli.ring.build import curve_of, rig_of, scene_problems
 from quiltcli.ring.cast import see_by_rays
+from quiltcli.ring.elevation import WORTH_A_WORD, plane_error
+from quiltcli.ring.hits import Cell
 from quiltcli.ring.picture import See, Show
 from quiltcli.ring.raster import Mesh, mesh_of, see
 from quiltcli.ring.rebin import as_bits
@@ -85,13 +87,15 @@ class RingStage:
         if not self._meshes or self._meshes[0][0] is not scene:
             self._meshes[:] = [(scene, mesh_of(scene.vertices, scene.triangles))]
         render, channels = self.job.render, self.job.output.channels
+        places = sample_places(render.samples) if render.samples > 1 else ((0.0, 0.0),)
         return Show(
             rig=self.rig,
             curve=curve,
             scene=scene,
             mesh=self._meshes[0][1],
             channels=channels,
-            samples=sample_places(render.samples) if render.samples > 1 else ((0.0, 0.0),),
+            samples=places,
+            cells=tuple(Cell(*cell_of(place, render.samples)) for place in places),
             backface_culling=render.backface_culling,
             near=self.ring.near,
             far=self.ring.farthest,
@@ -149,6 +153,20 @@ def _foreign(job: JobFile) -> Iterator[Problem]:
             )
 
 
+def _elevated(stage: RingStage) -> Iterator[str]:
+    """A word about viewers so high over the mirror that planes are not where its light goes."""
+    if stage.rig.cone:
+        return
+    places = [(stage.ring.height, stage.ring.distance)]
+    places += [(user.height, user.distance) for user in stage.ring.users]
+    off, height, distance = max((plane_error(stage.rig, d, h), h, d) for h, d in places)
+    if off > WORTH_A_WORD:
+        yield (
+            f"from {height:g} m high, {distance:g} m away things are drawn {off:.2g} pixels off, for light"
+            " leaves the mirror in planes only nearly (reflection: cone draws them right, and takes longer)"
+        )
+
+
 def with_mesh(show: Show, mesh: Mesh) -> Show:
     """The same pictures of other triangles."""
     return replace(show, mesh=mesh)
@@ -157,6 +175,7 @@ def with_mesh(show: Show, mesh: Mesh) -> Show:
 def notices(stage: RingStage) -> Iterable[str]:
     """What is worth a word before a render."""
     yield from stage.display.timing.notices()
+    yield from _elevated(stage)
     points = stage.scene.vertices
     radius = float(np.sqrt((points[:, [0, 2]] ** 2).sum(axis=1).max(initial=0.0)))
     if radius > stage.rig.radius:

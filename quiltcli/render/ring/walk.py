@@ -38,6 +38,8 @@ from quiltcli.render.ring.turn import (
     positions_in,
     write_bits,
 )
+from quiltcli.ring.curve import Curve, User
+from quiltcli.ring.elevation import plane_error
 from quiltcli.ring.picture import Show
 from quiltcli.ring.seen import slices_seen
 
@@ -179,6 +181,7 @@ def _entry(stage: RingStage, show: Show, record: TurnRecord) -> dict[str, Any]:
     """A frame as the report holds it."""
     counts = record.counts
     curve = show.curve
+    viewers: list[Curve | User] = [curve, *curve.users]
     return {
         "frame": record.frame,
         "positions": record.positions,
@@ -193,11 +196,20 @@ def _entry(stage: RingStage, show: Show, record: TurnRecord) -> dict[str, Any]:
             {"distance": distance, "images": slices_seen(stage.rig, distance)}
             for distance in (curve.distance, *(user.distance for user in curve.users))
         ],
+        "plane_error": [
+            {"height": each.height, "distance": each.distance, "pixels": _off(stage, each)}
+            for each in viewers
+        ],
         "viewers": viewers_json(curve),
         "seconds": record.seconds,
         "worker_seconds": counts.seconds,
         "packed": record.packed,
     }
+
+
+def _off(stage: RingStage, viewer: Curve | User) -> float:
+    """By how much planes are off for a viewer; cones are not."""
+    return 0.0 if stage.rig.cone else plane_error(stage.rig, viewer.distance, viewer.height)
 
 
 def _spread(values: Sequence[float]) -> dict[str, float] | None:
