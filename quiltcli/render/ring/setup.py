@@ -15,7 +15,7 @@ from quiltcli.job.mirror import MirrorDisplayFile
 from quiltcli.job.ring import RingSpec
 from quiltcli.lightfield import Field, load_field
 from quiltcli.render.antialiasing import cell_of, sample_places
-from quiltcli.render.setup import texture_limits
+from quiltcli.render.setup import scene_spec, texture_limits
 from quiltcli.ring.build import curve_of, rig_of, scene_problems
 from quiltcli.ring.cast import see_by_rays
 from quiltcli.ring.elevation import WORTH_A_WORD, plane_error
@@ -123,13 +123,13 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
         scene, source = empty_scene(), None
     else:
         store = TextureStore(texture_limits(job))
-        scene, source = load_moving_scene(load_scene_file(job.scene), float(job.fps), store)
+        scene, source = load_moving_scene(scene_spec(job), float(job.fps), store)
     raise_all(SceneError, source.problems(frames) if source else ())
     compensate = job.halftone is not None and job.halftone.compensate == "dwell"
     shortest = shortest_dwell(rig) if compensate else 1.0
     raise_all(JobError, _foreign(job))
-    if scene.soft is not None:
-        words = "has surfaces that light passes, which a 360° light field display does not show yet"
+    if scene.soft is not None and job.render.method == "raycast":
+        words = "has surfaces that light passes, which rays do not show (expected method exact or vertex)"
         raise SceneError(Problem(words, file=str(job.scene)))
     stage = RingStage(job, display, job.ring, rig, scene, source, shortest, photographs)
     problems: list[Problem] = []
