@@ -17,6 +17,7 @@ from PIL import Image
 import quiltcli
 from quiltcli.scene import load_scene
 from tests.helpers.gltf_files import SQUARE, TWO, GltfFile
+from tests.helpers.in_memory import icosphere
 
 filly = pytest.importorskip("filly", reason="Filament is not here (pip install -e '.[crosscheck]')")
 SIZE, FOV = 160, 40.0
@@ -173,3 +174,42 @@ def compare(linear, other):
     assert np.quantile(error[inner], 0.99) < 1
     seen = np.abs(other - np.multiply(KEY, 255)).max(axis=-1) > 2
     assert np.count_nonzero(seen != shown) <= 0.003 * shown.size
+
+
+def lit_ball(path: Path, metallic: float, gain: float) -> Path:
+    """A ball in the light of a sun from the upper left, of 3 times a unit of ours times `gain`."""
+    file = GltfFile(extensionsUsed=["KHR_lights_punctual"])
+    vertices, triangles = icosphere(4)
+    look = {"baseColorFactor": [0.8, 0.5, 0.3, 1], "metallicFactor": metallic, "roughnessFactor": 0.5}
+    file.json["materials"] = [{"pbrMetallicRoughness": look}]
+    places = file.accessor(vertices, min=vertices.min(axis=0).tolist(), max=vertices.max(axis=0).tolist())
+    primitive = {"attributes": {"POSITION": places, "NORMAL": file.accessor(vertices)}, "material": 0}
+    file.node(mesh=file.mesh({**primitive, "indices": file.accessor(triangles.ravel(), "u2")}))
+    sun = {"type": "directional", "intensity": 683 * 3.0 * gain, "color": [1, 1, 1]}
+    file.json["extensions"] = {"KHR_lights_punctual": {"lights": [sun]}}
+    turn = [-0.2468, 0.2905, 0.0778, 0.9212]  # about X, then Y
+    file.node(rotation=turn, extensions={"KHR_lights_punctual": {"light": 0}})
+    file.add("scenes", nodes=[0, 1])
+    return file.write(path)
+
+
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+def test_light_is_that_of_filament_but_for_what_the_models_differ_in(tmp_path, filament, metallic):
+    """Half of a lit ball is within 5 %, up to one factor for Filament's exposure.
+
+    Near the border of light our layer lets less in and out, as its Fresnel terms say; Filament's base is
+    Lambert's, and it makes up for light that rough metal loses from lobe to lobe.
+    """
+    eye, target = np.array([0, 0, 4.0]), np.zeros(3)
+    lit_ball(tmp_path / "ball.glb", metallic, 1)
+    (tmp_path / "s.yaml").write_text("quilt_scene: 1\nobjects: [{mesh: ball.glb}]\nlights: [{type: file}]\n")
+    light = ours("s.yaml", eye, target, tmp_path)[..., :3]
+    encoded = theirs(filament, lit_ball(tmp_path / "bright.glb", metallic, 40), eye, target) / 255
+    other = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    some = (other > 0.01) & (other < 0.98) & (light > 0.005)
+    assert np.count_nonzero(some) > 10_000
+    exposure = np.median(other[some] / light[some])
+    assert exposure == pytest.approx(0.76, rel=0.03), "the same for paint and metal"
+    off = np.abs(other[some] / (exposure * light[some]) - 1)
+    assert np.median(off) < 0.05
+    assert np.quantile(np.abs(other / exposure - light)[some], 0.75) < 0.03, "of light up to 1"
