@@ -370,18 +370,16 @@ class JobFile(FileModel):
         if self.layout is not None:
             yield ("layout",), "belongs to a display of facets (expected no such key beside ring)"
         if self.render.scale != 1:
-            words = (
-                f"belongs to a display of facets (expected no such key beside ring), got {self.render.scale}"
-            )
-            yield ("render", "scale"), words
+            words = "belongs to displays of facets (expected a smaller image of the display), got"
+            yield ("render", "scale"), f"{words} {self.render.scale}"
         if self.lightfield is not None and self.render.samples > 1:
             words = f"expected 1 beside lightfield, whose pictures are filtered, got {self.render.samples}"
             yield ("render", "samples"), words
-        if self.render.scale != 1:
-            yield (
-                ("render", "scale"),
-                "belongs to displays of facets (expected a smaller image of the display)",
-            )
+        if self.render.shutter:
+            words = "expected 0 beside ring: a turn shows its frame's instant, got"
+            yield ("render", "shutter"), f"{words} {self.render.shutter:g}"
+        if self.render.double_sided == "file":
+            yield ("render", "double_sided"), "expected all beside ring (or backface_culling), got file"
         if self.render.depth_bits is not None:
             yield ("render", "depth_bits"), "has no meaning on a ring of viewers (expected no such key)"
         if not (self.output.packed or self.output.tones):

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from quiltcli.errors import JobError, Problem, SceneError, ViewerError, raise_all
+from quiltcli.formats.capacity import bytes_text, free_memory
 from quiltcli.job import JobFile, load_lightfield_file, load_scene_file
 from quiltcli.job.halftone import HalftoneSpec
+from quiltcli.job.job import RenderSpec
 from quiltcli.job.load import load_mirror_file
 from quiltcli.job.mirror import MirrorDisplayFile
 from quiltcli.job.ring import RingSpec
@@ -31,6 +34,7 @@ from quiltcli.scene.bare import empty_scene
 from quiltcli.scene.motion import load_moving_scene
 from quiltcli.scene.source import SceneSource
 from quiltcli.scene.textures.pool import TextureStore
+from quiltcli.shading.lights import demand_shadows, prepare_shadows
 
 METHODS: dict[str, See] = {"exact": see, "raycast": see_by_rays, "vertex": see_by_vertices}
 
@@ -84,6 +88,7 @@ class RingStage:
             blame = load_scene_file(self.job.scene).source
             told = [blame.problem((), f"at frame {frame} the scene {words}") for words in problems]
             raise SceneError(told)
+        prepare_shadows(scene)  # before processes are forked, which share it
         if not self._meshes or self._meshes[0][0] is not scene:
             self._meshes[:] = [(scene, mesh_of(scene.vertices, scene.triangles))]
         render, channels = self.job.render, self.job.output.channels
@@ -99,10 +104,17 @@ class RingStage:
             backface_culling=render.backface_culling,
             near=self.ring.near,
             far=self.ring.farthest,
-            see=METHODS[render.method],
+            see=_way_to_see(render),
             field=self.photographs,
             frame=frame,
         )
+
+
+def _way_to_see(render: RenderSpec) -> See:
+    """What finds what pixels see, as the job wants it."""
+    if render.method == "vertex" and render.tessellate is not None:
+        return partial(see_by_vertices, tessellate=render.tessellate)
+    return METHODS[render.method]
 
 
 def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingStage:
@@ -114,6 +126,7 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
     assert job.ring is not None
     display = load_mirror_file(job.display)
     rig = rig_of(display)
+    _demand_memory(display, rig)
     frames = list(job.frames if frames is None else frames)
     photographs = None
     if job.lightfield is not None:
@@ -124,6 +137,7 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
     else:
         store = TextureStore(texture_limits(job))
         scene, source = load_moving_scene(scene_spec(job), float(job.fps), store)
+        demand_shadows(scene)
     raise_all(SceneError, source.problems(frames) if source else ())
     compensate = job.halftone is not None and job.halftone.compensate == "dwell"
     shortest = shortest_dwell(rig) if compensate else 1.0
@@ -142,6 +156,22 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
     if frames:
         stage.show(frames[0])
     return stage
+
+
+def _demand_memory(display: MirrorDisplayFile, rig: Rig) -> None:
+    """Raise unless a turn's pictures fit into the memory that is free."""
+    pixels, streams = rig.positions * rig.size[0] * rig.size[1], len(rig.streams)
+    # Tones, bits and what is on the mirror; one stream of tones as halftones take them.
+    needed, free = pixels * (3 * streams + 1 + 4), free_memory()
+    if free is not None and needed > free:
+        words = (
+            f"{rig.positions:,} pictures of {rig.size[0]}×{rig.size[1]} would take {bytes_text(needed)} of"
+        )
+        raise JobError(
+            display.source.problem(
+                ("image",), f"{words} memory, but {bytes_text(free)} are free (smaller ones take less)"
+            )
+        )
 
 
 def _foreign(job: JobFile) -> Iterator[Problem]:

@@ -13,7 +13,7 @@ from quiltcli.errors import JobError, OutputError, SceneError, ViewerError
 from quiltcli.formats.bitplanes import read_packed, unpack
 from quiltcli.formats.exr.image import read_exr
 from quiltcli.job import load_job
-from quiltcli.render.ring import turn
+from quiltcli.render.ring import setup, turn
 from quiltcli.render.ring.setup import set_ring_stage
 from quiltcli.render.ring.walk import RingOptions, render_turns
 from quiltcli.ring.picture import Picture, Show, draw_picture
@@ -262,3 +262,62 @@ def test_heads_come_from_a_recorded_path(tmp_path: Path) -> None:
     with pytest.raises(ViewerError) as error:
         set_ring_stage(load_job(job, [f"ring.heads={heads}"]))
     assert [problem.line for problem in error.value.problems] == [2, 3, 5]
+
+
+@pytest.mark.parametrize(
+    ("sets", "words"),
+    [
+        ("render.shutter=0.5", "render.shutter: expected 0 beside ring"),
+        ("render.double_sided=file", "render.double_sided: expected all beside ring"),
+        ("render.scale=1/2", "render.scale: belongs to displays of facets"),
+    ],
+)
+def test_what_a_turn_does_not_do_is_refused_once(whole: Path, sets: str, words: str) -> None:
+    with pytest.raises(JobError, match=words) as error:
+        load_job(whole.parent / "job.yaml", [sets])
+    assert len(error.value.problems) == 1
+
+
+def test_shadows_and_occlusion_are_as_the_job_wants_them(tmp_path: Path) -> None:
+    path = ring_job(tmp_path)
+    scene = tmp_path / "scene.yaml"
+    # A leaf over the ball, which keeps the lamp's light from all of it.
+    (tmp_path / "leaf.obj").write_text(
+        "v -.06 .2 -.06\nv .06 .2 -.06\nv .06 .2 .06\nv -.06 .2 .06\nf 1 4 3\nf 1 3 2\n"
+    )
+    lamp = "{type: directional, shadows: true, direction: [0, -1, 0], color: [1, 1, 1]}"
+    scene.write_text(
+        "quilt_scene: 1\nobjects: [{mesh: ball.obj}, {mesh: leaf.obj}]\n"
+        f"lights: [{lamp}, {{type: ambient, color: [0.2, 0.2, 0.2]}}]\n"
+    )
+
+    def light(*sets: str) -> float:
+        stage = set_ring_stage(load_job(path, sets))
+        picture = draw_picture(stage.show(1), stage.rig.angle(2))
+        return float(picture.rgb()[:, :, 1].mean(dtype=float))
+
+    shaded, plain = light(), light("render.shadows=false")
+    assert plain > 1.2 * shaded
+    assert light("render.ambient_occlusion={distance: 1}", "render.shadows=false") < 0.995 * plain
+
+
+def test_pictures_that_do_not_fit_into_memory_are_refused(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(setup, "free_memory", lambda: 800_000)
+    with pytest.raises(JobError, match=r"48 pictures of 48×48 would take 0\.885 MB of memory, but 0\.8 MB"):
+        render_turns(load_job(whole.parent / "job.yaml"), RingOptions(folder=tmp_path))
+
+
+def test_edges_of_vertices_bend_as_far_as_they_may(whole: Path) -> None:
+    def wrong(most: str) -> int:
+        stages = [
+            set_ring_stage(load_job(whole.parent / "job.yaml", ["display=" + str(fine), *sets]))
+            for sets in (["render.method=exact"], ["render.method=vertex", f"render.tessellate={most}"])
+        ]
+        exact, straight = (draw_picture(stage.show(3), 0.3).buffers["Z"] for stage in stages)
+        return int(np.count_nonzero(np.isfinite(exact) != np.isfinite(straight)))
+
+    fine = whole.parent / "fine.yaml"
+    fine.write_text((whole.parent / "turn.yaml").read_text().replace("[48, 48]", "[512, 512]"))
+    assert wrong("5") > 4 * wrong("0.01")
