@@ -143,6 +143,8 @@ class EnvironmentLight(Model):
     """How far off that may stand, metres; without this key anywhere."""
     rays: Rays = 32
     """Directions in which it is looked for from a pixel, more of them towards what is bright."""
+    visible: bool = False
+    """Whether it is seen where nothing else is, in place of the background."""
 
 
 class FileLights(Model):

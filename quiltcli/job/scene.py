@@ -35,6 +35,9 @@ from quiltcli.job.viewer import FrameRange
 Picture: TypeAlias = Annotated[Path, ExistingFile((), "a picture")]
 
 
+_ROLES = ("color", "emission", "metallic", "roughness", "normal", "bump", "occlusion")
+
+
 class TexturesSpec(Model):
     """Pictures that vary a material, laid out by the mesh's texture coordinates."""
 
@@ -48,6 +51,8 @@ class TexturesSpec(Model):
     """Picture of 0 to 1 for a mirror to chalk, of which red counts."""
     normal: Picture | None = None
     """Normal map: red to the picture's right, green to its upper edge, blue out of the surface."""
+    bump: Picture | None = None
+    """Picture of heights instead, white a hundredth of its width above black, of which red counts."""
     occlusion: Picture | None = None
     """Picture of how much of the ambient light arrives, of which red counts."""
     scale: Vec2 = (1.0, 1.0)
@@ -59,17 +64,21 @@ class TexturesSpec(Model):
     uv_set: Annotated[int, Field(ge=0, le=1)] = 0
     """Which of the mesh's texture coordinates, the number of the set."""
     strength: Number = 1.0
-    """Strength of the normal map: how many times its slopes; 0 is flat."""
+    """Strength of the normal map or the heights: how many times their slopes; 0 is flat."""
 
     def pictures(self) -> dict[str, Path]:
         """The pictures by what they vary."""
-        roles = ("color", "emission", "metallic", "roughness", "normal", "occlusion")
-        return {role: path for role in roles if (path := getattr(self, role)) is not None}
+        return {role: path for role in _ROLES if (path := getattr(self, role)) is not None}
 
     def cross_checks(self) -> Iterator[Complaint]:
-        """There is a picture."""
+        """There is a picture, and one of slopes."""
         if not self.pictures():
-            yield (), "names no picture (expected color, emission, metallic, roughness, normal or occlusion)"
+            yield (
+                (),
+                "names no picture (expected color, emission, metallic, roughness, normal, bump or occlusion)",
+            )
+        if self.normal is not None and self.bump is not None:
+            yield ("bump",), "cannot stand beside normal: both are slopes"
 
 
 _UNDER_PICTURES = {"color": (1.0, 1.0, 1.0), "emission": (1.0, 1.0, 1.0), "metallic": 1.0, "roughness": 1.0}
@@ -226,6 +235,14 @@ class SceneFile(FileModel):
     """Lights, or `file` for those of the meshes; a headlight and a dim ambient light when there are none."""
     background: Rgb = (0.0, 0.0, 0.0)
     """Colour where nothing is hit, linear."""
+
+    def cross_checks(self) -> Iterator[Complaint]:
+        """One sky is seen, and no colour in its place."""
+        seen = [k for k, light in enumerate(self.lights) if light.type == "environment" and light.visible]
+        for k in seen[1:]:
+            yield ("lights", k, "visible"), f"lights[{seen[0]}] is seen already (expected one sky at most)"
+        if seen and any(self.background):
+            yield ("background",), f"lights[{seen[0]}] is seen in its place (expected no such key beside it)"
 
     def without_shadows(self) -> SceneFile:
         """The same with lights that shine through everything."""

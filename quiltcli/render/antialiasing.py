@@ -22,9 +22,9 @@ import numpy as np
 
 from quiltcli.geometry import BoolArray, FloatArray
 from quiltcli.layout import Layout
-from quiltcli.render.buffers import Buffers
+from quiltcli.render.buffers import Buffers, background_of
 from quiltcli.render.setup import Stage
-from quiltcli.render.sums import Sums, new_sums
+from quiltcli.render.sums import Sums, new_sums, write_alike
 from quiltcli.shading.aovs import shaded_for, wanted_for
 from quiltcli.shading.layers import layers
 from quiltcli.shading.once import may_be_once, shaded_once
@@ -72,12 +72,17 @@ def draw_samples(
         channels: some of `sums.summed`.
     """
     sums, count = new_batch_sums(stage, batch, channels), stage.job.render.samples
-    add_samples(stage, frame, batch, sums, sample_places(count))
-    sums.store(buffers, count, stage.scene.background)
+    add_samples(stage, frame, batch, sums, sample_places(count), buffers)
+    sums.store(buffers, count, background_of(stage, frame.rays))
 
 
 def add_samples(
-    stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums, places: Sequence[tuple[float, float]]
+    stage: Stage,
+    frame: Frame,
+    batch: tuple[int, int],
+    sums: Sums,
+    places: Sequence[tuple[float, float]],
+    buffers: Buffers | None = None,
 ) -> None:
     """Add samples of a batch to sums.
 
@@ -87,12 +92,13 @@ def add_samples(
         batch: the range of blocks.
         sums: added to.
         places: the samples' places in a pixel, from its centre.
+        buffers: written to where these are all samples of a pixel and see alike, instead of being added.
     """
     scene, wanted, count = stage.scene, wanted_for(sums.channels, stage.scene), stage.job.render.samples
     done = None
     once = len(places) >= _WORTH_SETTLING and not stage.job.render.sample_shading
     if once and frame.order is None and may_be_once(scene):
-        done = _add_settled(stage, frame, batch, sums, len(places))
+        done = _add_settled(stage, frame, batch, sums, len(places), buffers)
     for place in places:
         sample = Sample(sample_places(count).index(place), count)
         cells = None
@@ -106,7 +112,9 @@ def add_samples(
         drawing.done()
 
 
-def _add_settled(stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums, times: int) -> BoolArray:
+def _add_settled(
+    stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums, times: int, buffers: Buffers | None
+) -> BoolArray:
     """Add what all of so many samples see alike: smooth light where one triangle is all they can see.
 
     The mean of smooth light over a pixel is that of its centre, nearly: it is worked out once for a triangle
@@ -122,7 +130,10 @@ def _add_settled(stage: Stage, frame: Frame, batch: tuple[int, int], sums: Sums,
     drawing = draw(frame, batch, settled=True)
     wanted = wanted_for(sums.channels, scene)
     for shaded, number in shaded_once(drawing.regions(wanted, scene), scene, frame.viewer.eye):
-        sums.add(shaded, times=times)
+        if buffers is None:
+            sums.add(shaded, times=times)
+        else:
+            write_alike(shaded, sums.channels, buffers, times)
         done[number - tiles.start] = True
     drawing.done()
     return done

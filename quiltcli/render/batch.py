@@ -7,12 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, Float32Array, IntArray
+from quiltcli.geometry import BoolArray, IntArray
 from quiltcli.projection.gaze import Gaze
 from quiltcli.render.antialiasing import draw_samples, new_batch_sums
-from quiltcli.render.buffers import Buffers, empty_values, lay_background, mends_itself
+from quiltcli.render.buffers import (
+    Buffers,
+    background_of,
+    empty_values,
+    lay_background,
+    lay_sky,
+    mends_itself,
+)
 from quiltcli.render.setup import Stage
-from quiltcli.render.sums import Sums, summed
+from quiltcli.render.sums import Background, Sums, summed
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
 from quiltcli.shading.layers import Layer, layers
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
@@ -54,7 +61,8 @@ def draw_batch(
     """
     frame = ordered(stage, frame)
     block = np.arange(*batch)
-    lay_background(stage, block[frame.rays.lit[stage.blocks.facet[block]]], buffers, frame.rays)
+    lit = block[frame.rays.lit[stage.blocks.facet[block]]]
+    lay_background(stage, lit, buffers, frame.rays)
     channels = stage.job.output.channels
     light = summed(channels) if exposed or stage.job.render.samples > 1 else ()
     if light:
@@ -75,6 +83,7 @@ def draw_batch(
         empty_missed(stage, drawing, stale, first, buffers)
     if drawing.soft is not None:
         visible += draw_layers(stage, drawing, batch, buffers, channels, wanted, gaze, frame.order)
+    lay_sky(stage, lit, buffers, frame.rays)
     tiles = np.full(stale.size, not mends_itself(stage))
     tiles[drawing.drawn() - first] = True
     drawing.done()
@@ -95,9 +104,10 @@ def draw_layers(
 
     Light goes through all layers; other channels are those of the first that holds up any.
     """
+    assert gaze.rays is not None
     found = layers(drawing, wanted, stage.scene, gaze.viewer.eye)
     sums = new_batch_sums(stage, batch, summed(channels))
-    return put_layers(found, sums, buffers, channels, gaze, stage.scene.background, order)
+    return put_layers(found, sums, buffers, channels, gaze, background_of(stage, gaze.rays), order)
 
 
 def put_layers(
@@ -106,7 +116,7 @@ def put_layers(
     buffers: Buffers,
     channels: tuple[str, ...],
     gaze: Gaze,
-    background: Float32Array,
+    background: Background,
     order: DepthOrder | None = None,
 ) -> int:
     """Write channels at the pixels of layers, see `draw_layers`; `sums`, empty, are of those of light."""

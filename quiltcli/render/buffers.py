@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.channels import empty_buffers, exr_channels
-from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.channels import MOST_HALF, empty_buffers, exr_channels
+from quiltcli.geometry import BoolArray, Float32Array, IntArray
 from quiltcli.projection.planar import QuiltRays
 from quiltcli.render.setup import Stage
+from quiltcli.shading.sky import sky_at
 from quiltcli.visibility.draw import Frame, block_window
+from quiltcli.visibility.rays.pixels import places
 
 Buffers = dict[str, NDArray[Any]]
 
@@ -44,7 +47,8 @@ def empty_values(stage: Stage) -> dict[str, float]:
 
 def has_background(stage: Stage) -> bool:
     """Whether pixels that do not see the scene have a colour."""
-    return "rgba" in stage.job.output.channels and bool(stage.scene.background.any())
+    shows = stage.scene.sky is not None or bool(stage.scene.background.any())
+    return "rgba" in stage.job.output.channels and shows
 
 
 def mends_itself(stage: Stage) -> bool:
@@ -60,22 +64,56 @@ def lay_background(stage: Stage, blocks: IntArray, buffers: Buffers, rays: Quilt
 
     Of curved facets only the pixels that show an image to the eye.
     """
-    if not has_background(stage):
+    if not has_background(stage) or stage.scene.sky is not None:
         return
     for block in blocks.tolist():
-        owner = block_window(stage.owners, stage.blocks, block)
-        facet = int(stage.blocks.facet[block]) + 1
-        mine = (owner == facet) | (owner == -facet)
-        view = rays.views[facet - 1] if rays.views else None
-        if view is not None:
-            height, width = mine.shape
-            x, y = (float(first[block]) + 0.5 for first in (stage.blocks.x0, stage.blocks.y0))
-            mine[:, : stage.blocks.margin[block]] = False
-            mine &= view.lit(x + np.arange(width), y + np.arange(height)[:, None])
+        mine = _lit_pixels(stage, block, rays)
         for name, value in zip("RGB", stage.scene.background, strict=True):
             pixels = block_window(buffers[name], stage.blocks, block)
             # The brightest that half floats hold is bright enough for a background.
             np.copyto(pixels, min(value, np.finfo(pixels.dtype).max), where=mine, casting="same_kind")
+
+
+def lay_sky(stage: Stage, blocks: IntArray, buffers: Buffers, rays: QuiltRays) -> None:
+    """Give those pixels of these blocks the sky that show nothing else, once everything else is drawn."""
+    if not has_background(stage) or stage.scene.sky is None:
+        return
+    for block in blocks.tolist():
+        mine = _lit_pixels(stage, block, rays)
+        mine &= block_window(buffers["A"], stage.blocks, block) == 0
+        row, column = np.nonzero(mine)
+        if row.size:
+            address = int(stage.blocks.address[block]) + row * int(stage.blocks.stride[block]) + column
+            for name, values in zip("RGB", sky_behind(stage, rays, address), strict=True):
+                buffers[name][address] = values
+
+
+def sky_behind(stage: Stage, rays: QuiltRays, address: IntArray) -> Float32Array:
+    """The sky (3, P) in the directions of pixels of facets that are lit, at quilt addresses (P,)."""
+    assert stage.scene.sky is not None
+    pixels = places(address, stage.layout, stage.owners, rays)
+    steps = (np.ascontiguousarray(pixels.ray[:, :, k].T) for k in (0, 1))
+    found = sky_at(stage.scene.sky, np.ascontiguousarray(pixels.rays().T), *steps)
+    return np.minimum(found, MOST_HALF)
+
+
+def background_of(stage: Stage, rays: QuiltRays) -> Float32Array | Callable[[IntArray], Float32Array]:
+    """What samples see that see nothing else, as `sums.Sums.store` takes it."""
+    return stage.scene.background if stage.scene.sky is None else partial(sky_behind, stage, rays)
+
+
+def _lit_pixels(stage: Stage, block: int, rays: QuiltRays) -> BoolArray:
+    """Which pixels (h, w) of a block its facet owns; of curved facets those that show an image to the eye."""
+    owner = block_window(stage.owners, stage.blocks, block)
+    facet = int(stage.blocks.facet[block]) + 1
+    mine = (owner == facet) | (owner == -facet)
+    view = rays.views[facet - 1] if rays.views else None
+    if view is not None:
+        height, width = mine.shape
+        x, y = (float(first[block]) + 0.5 for first in (stage.blocks.x0, stage.blocks.y0))
+        mine[:, : stage.blocks.margin[block]] = False
+        mine &= view.lit(x + np.arange(width), y + np.arange(height)[:, None])
+    return np.asarray(mine)
 
 
 def empty_before(

@@ -12,13 +12,13 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from quiltcli.geometry import BoolArray, IntArray
+from quiltcli.geometry import BoolArray, Float32Array, IntArray
 from quiltcli.projection.planar import QuiltRays
 from quiltcli.render.antialiasing import add_samples
 from quiltcli.render.batch import Drawn, draw_batch, ordered
 from quiltcli.render.buffers import Buffers, clear_blocks
 from quiltcli.render.setup import Stage
-from quiltcli.render.sums import Sums, new_sums, summed
+from quiltcli.render.sums import Background, Sums, new_sums, summed
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import Binned, BinPlan, bin_frame, bin_plan
@@ -126,8 +126,16 @@ def _expose(stage: Stage, frame: Frame, sums: Sums, places: Places, batch: tuple
 
 def develop(stage: Stage, sums: Sums, buffers: Buffers, part: slice) -> None:
     """Write some of an exposure's pixels into buffers, and make their sums 0."""
-    sums.store(buffers, stage.job.render.samples, stage.scene.background, part)
+    background: Background = stage.scene.background
+    if stage.scene.sky is not None:
+        # It lies there since the shutter opened.
+        background = partial(_there, buffers)
+    sums.store(buffers, stage.job.render.samples, background, part)
     sums.clear(part)
+
+
+def _there(buffers: Buffers, address: IntArray) -> Float32Array:
+    return np.stack([buffers[name][address].astype(np.float32) for name in "RGB"])
 
 
 def shares_of(count: int, parts: int) -> list[slice]:

@@ -8,7 +8,7 @@ those that find none free are left out, as the channel could not hold them anywa
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +21,31 @@ from quiltcli.shading.aovs import light_at_points
 from quiltcli.shading.mattes import identities_of
 
 _ONE = np.float32(1)
+Background: TypeAlias = "Float32Array | Callable[[IntArray], Float32Array]"
 
 
 def summed(channels: tuple[str, ...]) -> tuple[str, ...]:
     """Those of the channels that are made of all samples of a pixel."""
     return tuple(name for name in channels if CHANNELS[name].averaged or CHANNELS[name].matte)
+
+
+def write_alike(shaded: Shaded, channels: tuple[str, ...], buffers: Buffers, count: int) -> None:
+    """Write what all of `count` samples of some pixels see alike: to the last bit the mean of their sum."""
+    hits, whole = shaded.hits, np.float32(count)
+    one = np.ones((1, 1), dtype=np.float16)
+    for name in channels:
+        if CHANNELS[name].matte:
+            identity = identities_of(shaded.scene, name, hits.triangle).view(np.float32)
+            first, share, *rest = CHANNELS[name].layers
+            hits.put(buffers[first], identity[:, None])
+            for layer, value in ((share, 1), *((layer, 0) for layer in rest)):
+                hits.put(buffers[layer], np.full((1, 1), value, dtype=np.float32))
+            continue
+        for layer, values in zip(CHANNELS[name].layers, light_at_points(name, shaded), strict=False):
+            mean = np.minimum(values, MOST_HALF) * whole / whole
+            hits.put(buffers[layer], np.minimum(mean, MOST_HALF).astype(np.float16))
+        if name == "rgba":
+            hits.put(buffers["A"], one)
 
 
 def new_sums(channels: tuple[str, ...], zeros: Callable[[Any], NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -91,15 +111,13 @@ class Sums:
             if not pixel.size:
                 return
 
-    def store(
-        self, buffers: Buffers, count: int, background: Float32Array, part: slice | None = None
-    ) -> None:
+    def store(self, buffers: Buffers, count: int, background: Background, part: slice | None = None) -> None:
         """Write the means into the pixels of which any of `count` samples sees something.
 
         Args:
             buffers: written to.
             count: samples a pixel.
-            background: (3,) what the other samples see.
+            background: (3,) what the other samples see, or what gives it (3, P) at quilt addresses (P,).
             part: the only pixels that are looked at, from the first address on; None for all.
         """
         part = part or slice(0, self.size)
@@ -117,13 +135,20 @@ class Sums:
             values[pixel] = 0
 
     def _store_light(
-        self, buffers: Buffers, name: str, pixel: IntArray, count: int, background: Float32Array
+        self, buffers: Buffers, name: str, pixel: IntArray, count: int, background: Background
     ) -> None:
         seen: Float32Array = self._memory["cover"][pixel]
         whole = np.float32(count)
+        behind: Float32Array | None = None
+        if callable(background) and name == "rgba":
+            behind = np.zeros((3, pixel.size), dtype=np.float32)
+            some = np.flatnonzero(seen < whole)
+            behind[:, some] = background(pixel[some] + self._first)
         for k, layer in enumerate(CHANNELS[name].layers[:3]):
             values: Float32Array = self._memory[f"{name}.{k}"][pixel]
-            if name == "rgba":
+            if behind is not None:
+                values += (count - seen) * behind[k]
+            elif name == "rgba" and not callable(background):
                 values += (count - seen) * background[k]
             values /= whole
             self._put(buffers, layer, pixel, values)

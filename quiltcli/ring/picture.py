@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from dataclasses import field as made_by
 from typing import Any
 
@@ -12,20 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quiltcli.channels import CHANNELS, MOST_HALF, empty_buffers
-from quiltcli.geometry import BoolArray, IntArray, slices
+from quiltcli.geometry import BoolArray, Float32Array, IntArray, slices
 from quiltcli.lightfield import Field
 from quiltcli.projection.gaze import Gaze
+from quiltcli.ring.cast import lines_of
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.hits import EYE, WHOLE, Cell, ring_hits
 from quiltcli.ring.outline import lit_pixels
 from quiltcli.ring.raster import Limits, Mesh, Visible, see
+from quiltcli.ring.rays import Window
 from quiltcli.ring.rebin import rebinned
 from quiltcli.ring.rig import Pose, Rig
 from quiltcli.scene import Scene
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill, light_at_points
+from quiltcli.shading.layers import Layer, blended
 from quiltcli.shading.shadows import CENTRE, Sample
+from quiltcli.shading.sky import sky_at
 from quiltcli.viewer.viewer import Viewer
+from quiltcli.visibility.resolve.layers import LayerHits
 
 _CHUNK = 16384
 See = Callable[..., Visible]
@@ -142,7 +147,7 @@ def draw_picture(show: Show, angle: float, side: int = 0) -> Picture:
     buffers, counts = empty_buffers(show.channels, lit.size), Counts()
     if show.field is not None:
         return Picture(pose, lit, buffers, _photographed(show, show.field, pose, lit, buffers))
-    _background(show, lit, buffers)
+    _background(show, pose, lit, buffers)
     several = len(show.samples) > 1
     light = tuple(name for name in show.channels if CHANNELS[name].averaged and several)
     rest = tuple(name for name in show.channels if name not in light)
@@ -167,8 +172,19 @@ def _photographed(
     return counts
 
 
-def _background(show: Show, lit: BoolArray, buffers: dict[str, NDArray[Any]]) -> None:
-    """The mirror shows the background's colour where it shows nothing else."""
+def _background(show: Show, pose: Pose, lit: BoolArray, buffers: dict[str, NDArray[Any]]) -> None:
+    """The mirror shows the background's colour, or the sky, where it shows nothing else."""
+    if show.scene.sky is not None and "rgba" in show.channels:
+        address = np.flatnonzero(lit)
+        row, column = np.divmod(address, lit.shape[1])
+        x, y = column + 0.5, row + 0.5
+        ways = [
+            np.ascontiguousarray(lines_of(pose, show.curve, x + dx, y + dy).along.T)
+            for dx, dy in ((0.0, 0.0), (-0.5, 0.0), (0.5, 0.0), (0.0, -0.5), (0.0, 0.5))
+        ]
+        colors = sky_at(show.scene.sky, ways[0], ways[2] - ways[1], ways[4] - ways[3])
+        for name, values in zip("RGB", np.minimum(colors, MOST_HALF), strict=True):
+            buffers[name][address] = values
     if not show.scene.background.any():
         return
     for name, value in zip("RGB", show.scene.background, strict=True):
@@ -179,9 +195,18 @@ def _centres(
     show: Show, pose: Pose, lit: BoolArray, channels: Sequence[str], buffers: dict[str, NDArray[Any]]
 ) -> Counts:
     seen, address, counts = _look(show, pose, lit, (0.0, 0.0))
-    start = time.perf_counter()
+    start, gaze = time.perf_counter(), Gaze(show.viewer, None)
     for part in slices(0, seen.pixel.size, _CHUNK):
-        fill(buffers, channels, Gaze(show.viewer, None), _shaded(show, pose, seen, address, part))
+        fill(buffers, channels, gaze, _shaded(show, pose, seen, address, part))
+    if seen.through is not None:
+        light = tuple(name for name in channels if CHANNELS[name].averaged)
+        data = tuple(name for name in channels if name not in light)
+        sums = _Sums(lit.size, light)
+        for layer in _layers(show, pose, seen):
+            sums.add(layer.shaded, layer.weight)
+            fill(buffers, data, gaze, layer.shaded, np.flatnonzero(layer.first))
+            counts.visible += int(np.count_nonzero(layer.first))
+        sums.store(show, buffers, 1)
     counts.seconds["shade"] = time.perf_counter() - start
     return counts
 
@@ -190,33 +215,51 @@ def _samples(
     show: Show, pose: Pose, lit: BoolArray, channels: Sequence[str], buffers: dict[str, NDArray[Any]]
 ) -> Counts:
     """Means of light over the samples; what misses the scene counts as background."""
-    hits = np.zeros(lit.size, dtype=np.uint16)
-    sums = {name: [np.zeros(lit.size, dtype=np.float32) for _ in range(3)] for name in channels}
-    counts = Counts()
+    sums, counts = _Sums(lit.size, channels), Counts()
     for number, (place, cell) in enumerate(zip(show.samples, show.cells, strict=True)):
         seen, address, some = _look(show, pose, lit, place)
         sample = Sample(number, len(show.samples))
         counts.add(some)
         for part in slices(0, seen.pixel.size, _CHUNK):
-            shaded = _shaded(show, pose, seen, address, part, cell, sample)
-            pixel = address[part]
-            hits[pixel] += 1
-            for name in channels:
-                for values, total in zip(light_at_points(name, shaded), sums[name], strict=True):
-                    total[pixel] += shaded.hits.drawn(np.minimum(values, MOST_HALF))
-    pixel = np.flatnonzero(hits)
-    share = hits[pixel].astype(np.float32)
-    count = np.float32(len(show.samples))
-    for name, totals in sums.items():
-        for k, (layer, total) in enumerate(zip(CHANNELS[name].layers, totals, strict=False)):
-            values = total[pixel]
-            if name == "rgba":
-                values += (count - share) * show.scene.background[k]
-            buffers[layer][pixel] = np.minimum(values / count, MOST_HALF)
-        if name == "rgba":
-            buffers["A"][pixel] = share / count
-    counts.visible = pixel.size
+            sums.add(_shaded(show, pose, seen, address, part, cell, sample))
+        for layer in _layers(show, pose, seen, cell, sample):
+            sums.add(layer.shaded, layer.weight)
+    counts.visible = sums.store(show, buffers, len(show.samples))
     return counts
+
+
+class _Sums:
+    """Sums of light over the samples and layers of pixels, and the share of samples that see the scene."""
+
+    def __init__(self, size: int, channels: Sequence[str]) -> None:
+        self._cover = np.zeros(size, dtype=np.float32)
+        self._light = {name: [np.zeros(size, dtype=np.float32) for _ in range(3)] for name in channels}
+
+    def add(self, shaded: Shaded, weight: Float32Array | None = None) -> None:
+        """Add what pixels see, each once, or a share (P,) of it."""
+        pixel = shaded.hits.pixel
+        self._cover[pixel] += np.float32(1) if weight is None else weight
+        for name, sums in self._light.items():
+            for values, total in zip(light_at_points(name, shaded), sums, strict=True):
+                found = shaded.hits.drawn(np.minimum(values, MOST_HALF))
+                total[pixel] += found if weight is None else weight * found
+
+    def store(self, show: Show, buffers: dict[str, NDArray[Any]], samples: int) -> int:
+        """Write the means over so many samples; how many pixels see anything."""
+        pixel = np.flatnonzero(self._cover)
+        share, count = self._cover[pixel], np.float32(samples)
+        for name, totals in self._light.items():
+            for k, (layer, total) in enumerate(zip(CHANNELS[name].layers, totals, strict=False)):
+                values = total[pixel]
+                if name == "rgba":
+                    there = show.scene.background[k]
+                    if show.scene.sky is not None:
+                        there = buffers[layer][pixel].astype(np.float32)
+                    values += (count - share) * there
+                buffers[layer][pixel] = np.minimum(values / count, MOST_HALF)
+            if name == "rgba":
+                buffers["A"][pixel] = share / count
+        return int(pixel.size)
 
 
 def _look(
@@ -224,15 +267,46 @@ def _look(
 ) -> tuple[Visible, IntArray, Counts]:
     """What the mirror's pixels see, and where they lie in the picture."""
     start = time.perf_counter()
-    seen = show.see(pose, show.curve, show.mesh, show.rig.size, show.backface_culling, show.limits, beside)
+    how = {} if show.scene.soft is None else {"soft": show.scene.soft}
+    seen = show.see(
+        pose, show.curve, show.mesh, show.rig.size, show.backface_culling, show.limits, beside, **how
+    )
     window = seen.window
-    row, column = np.divmod(seen.pixel, max(window.width, 1))
-    address = (row + window.y) * show.rig.size[0] + column + window.x
+    address = _addresses(show, window, seen.pixel)
     kept = np.flatnonzero(lit.reshape(-1).take(address))
     found = seen.some(kept)
+    if seen.through is not None:
+        places = _addresses(show, window, seen.through.fragments.pixel)
+        found = replace(found, through=seen.through.some(lit.reshape(-1).take(places)))
     seconds = {"visibility": time.perf_counter() - start}
     counts = Counts(seen.candidates, seen.fragments, kept.size, seen.bend, seconds)
     return found, address[kept], counts
+
+
+def _addresses(show: Show, window: Window, pixel: IntArray) -> IntArray:
+    """Where pixels (P,) of a window lie in the picture."""
+    row, column = np.divmod(pixel, max(window.width, 1))
+    return (row + window.y) * show.rig.size[0] + column + window.x
+
+
+def _layers(
+    show: Show, pose: Pose, seen: Visible, cell: Cell = WHOLE, sample: Sample = CENTRE
+) -> Iterator[Layer]:
+    """What is seen through something, from the front to the back."""
+    through = seen.through
+    if through is None:
+        return
+    pixel = through.fragments.pixel
+    light, address = np.ones(pixel.size, dtype=np.bool_), _addresses(show, seen.window, pixel)
+
+    def found() -> Iterator[LayerHits]:
+        for row, triangle in through.layers(light):
+            mine = replace(seen, pixel=pixel[row], triangle=triangle)
+            for part in slices(0, row.size, _CHUNK):
+                hits = ring_hits(pose, show.mesh, show.scene, mine, part, address[row[part]], cell)
+                yield LayerHits(row[part], hits, np.ones(hits.triangle.size, dtype=np.bool_))
+
+    yield from blended(found(), light, show.scene, EYE, sample)
 
 
 def _shaded(

@@ -21,6 +21,7 @@ from quiltcli.ring.plane import pixels_of, through_mirror, viewer_along
 from quiltcli.ring.propose import Boxes, bending, propose
 from quiltcli.ring.rays import RayTable, Window, window_rays
 from quiltcli.ring.rig import Pose
+from quiltcli.ring.through import Through, gathered
 from quiltcli.visibility.setup.planes import LATTICE
 
 _SIDES = (1, 2, 3, 4, 5, 6, 8, 10, 12)
@@ -72,6 +73,7 @@ class Visible:
         candidates: pairs of pixel and triangle that were tried.
         fragments: pairs that hit.
         bend: pixels by which the longest edge may leave a straight line.
+        through: the pixels that are seen through something, which are not among `pixel`; None for none.
     """
 
     window: Window
@@ -82,6 +84,7 @@ class Visible:
     candidates: int
     fragments: int
     bend: float
+    through: Through | None = None
 
     def some(self, rows: IntArray) -> Visible:
         """Only some of the pixels that see something."""
@@ -112,6 +115,7 @@ def see(
     beside: tuple[float, float] = (0.0, 0.0),
     *,
     straight: bool = False,
+    soft: BoolArray | None = None,
 ) -> Visible:
     """What the pixels of a picture see.
 
@@ -124,6 +128,7 @@ def see(
         limits: near and far, where anything may lie beyond them.
         beside: of the samples, pixels from the pixels' centres.
         straight: let edges be straight between the corners' pixels, which they are not.
+        soft: (T,) triangles that light may pass; None for none: the nearest is seen, whatever it is.
     """
     corners = in_frame(pose, mesh.vertices)
     least, most = corners.min(axis=1), corners.max(axis=1)
@@ -136,6 +141,7 @@ def see(
     bits = max(int(mesh.count).bit_length(), 1)
     keys = np.zeros(window.size, dtype=np.int64)
     candidates = fragments = 0
+    some: list[tuple[IntArray, IntArray]] = []
     for triangle, pixel in _tries(boxes, window):
         forms = forms_of(*(corners.take(corner.take(triangle), axis=1) for corner in mesh.triangles))
         if straight:
@@ -152,11 +158,18 @@ def see(
         key = s.view(np.int64) >> bits
         key <<= bits
         key |= mesh.count - 1 - which
+        if soft is not None:
+            passed = soft.take(which)
+            some.append((found[passed], key[passed]))
+            found, key = found[~passed], key[~passed]
         np.maximum.at(keys, found, key)
+    through = gathered(keys, some, bits, mesh.count) if some else None
     seen = np.flatnonzero(keys)
     number = mesh.count - 1 - (keys[seen] & ((1 << bits) - 1))
     longest = float(np.sqrt(mesh.square.max(initial=0.0)))
-    return Visible(window, rays, seen, number, corners, candidates, fragments, bend.most / 2 * longest**2 / 8)
+    return Visible(
+        window, rays, seen, number, corners, candidates, fragments, bend.most / 2 * longest**2 / 8, through
+    )
 
 
 def in_frame(pose: Pose, vertices: FloatArray) -> FloatArray:

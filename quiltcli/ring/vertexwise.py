@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from quiltcli.geometry import FloatArray, IntArray, segments
+from quiltcli.geometry import BoolArray, FloatArray, IntArray, segments
 from quiltcli.geometry import offsets as starts_of
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.propose import bending
@@ -31,13 +31,16 @@ def see_by_vertices(
     beside: tuple[float, float] = (0.0, 0.0),
     *,
     tessellate: float = TESSELLATE,
+    soft: BoolArray | None = None,
 ) -> Visible:
     """As `raster.see`, with straight edges; `tessellate` is how far they may bend, pixels."""
     corners = in_frame(pose, mesh.vertices)
     bend = bending(pose, curve, corners.min(axis=1), corners.max(axis=1)).most / 2
     pieces, parent = divided(mesh, bend / 8, tessellate)
-    seen = see(pose, curve, pieces, size, backface_culling, limits, beside, straight=True)
-    return replace(seen, triangle=parent[seen.triangle], corners=corners)
+    passed = None if soft is None else soft[parent]
+    seen = see(pose, curve, pieces, size, backface_culling, limits, beside, straight=True, soft=passed)
+    through = None if seen.through is None else replace(seen.through, parent=parent)
+    return replace(seen, triangle=parent[seen.triangle], corners=corners, through=through)
 
 
 def divided(mesh: Mesh, bend: float, most: float) -> tuple[Mesh, IntArray]:

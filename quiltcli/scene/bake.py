@@ -32,6 +32,7 @@ class Baked:
         opacities: (V,) alpha, or None where no part has any.
         uv: (V, 2) texture coordinates, NaN where a part has none, or None where no part has any.
         uv1: (V, 2) those of the second set, likewise.
+        turns: (V, 3) how tangents of the files lie, or None where no part has any.
         source: (V,) the vertex of the joined parts each one is a copy of.
         group: (V,) numbers that vertices of one computed normal share, -1 where the file gives one.
     """
@@ -49,6 +50,7 @@ class Baked:
     uv: FloatArray | None = None
     opacities: Float32Array | None = None
     uv1: FloatArray | None = None
+    turns: Float32Array | None = None
 
 
 def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
@@ -72,13 +74,13 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
 
     given = _given_normals(parts) if mode == "auto" else np.zeros_like(vertices)
     colors, uv, uv1 = _given_colors(parts), *given_uv(parts)
-    opacities = given_opacities(parts)
+    opacities, turns = given_opacities(parts), given_turns(parts)
     source, triangles, normals, group = _with_normals(
         vertices,
         triangles,
         given,
         180.0 if mode != "auto" else CREASE_DEG,
-        keep_sources=any(values is not None for values in (colors, uv, uv1, opacities)),
+        keep_sources=any(values is not None for values in (colors, uv, uv1, opacities, turns)),
     )
     return Baked(
         vertices=vertices[source],
@@ -94,6 +96,7 @@ def bake(parts: Sequence[Part], mode: str = "auto") -> Baked:
         source=source,
         group=group,
         opacities=None if opacities is None else opacities[source],
+        turns=None if turns is None else turns[source],
     )
 
 
@@ -162,6 +165,16 @@ def given_opacities(parts: Sequence[Part] | Sequence[Baked]) -> Float32Array | N
         return None
     given = [np.ones(len(p.vertices), np.float32) if p.opacities is None else p.opacities for p in parts]
     return np.concatenate(given)
+
+
+def given_turns(parts: Sequence[Part] | Sequence[Baked]) -> Float32Array | None:
+    """How tangents of files lie (V, 3), as those that are made where some have none; None where none has."""
+    if all(part.turns is None for part in parts):
+        return None
+    as_made = np.array([[1, 0, 1]], dtype=np.float32)
+    return np.concatenate(
+        [np.repeat(as_made, len(p.vertices), axis=0) if p.turns is None else p.turns for p in parts]
+    )
 
 
 def given_uv(parts: Sequence[Part] | Sequence[Baked]) -> tuple[FloatArray | None, FloatArray | None]:

@@ -12,7 +12,7 @@ import numpy as np
 from quiltcli.errors import MeshError, Problem, SceneError, counted, raise_all
 from quiltcli.formats.mesh.coverage import NOTHING, Coverage
 from quiltcli.geometry import Float32Array
-from quiltcli.scene.bake import Baked, given_opacities, given_uv
+from quiltcli.scene.bake import Baked, given_opacities, given_turns, given_uv
 from quiltcli.scene.importers.asset import Asset, read_asset
 from quiltcli.scene.importers.model import FileLight, Model, Playing
 from quiltcli.scene.lights import (
@@ -208,6 +208,7 @@ def _assembled(gathered: _Gathered, lights: Sequence[LightSpec], background: Col
         material_names=tuple(gathered.material_names),
         material_name=np.concatenate(named),
         opacities=given_opacities(baked),
+        turns=given_turns(baked),
         notices=_notices(gathered, lights),
     )
 

@@ -23,7 +23,7 @@ class Texture:
 
     Attributes:
         role: what it varies: `color`, `emission`, `roughness`, `metallic`, `normal`, `occlusion`, and what
-            is not drawn: `opacity`, `bump`, …
+            is not drawn: `specular`, `displacement`, …
         picture: where its pixels come from.
         matrix: (2 · 3) row by row: u, v of the picture from the vertices' texture coordinates, both with
             v down from the picture's upper edge.
@@ -35,6 +35,7 @@ class Texture:
         raw: whether its numbers are light as they are, whatever the role.
         opaque: whether its alpha is of no account.
         use: whose texture it is, for messages.
+        nearest: whether texels that are seen enlarged are squares of one colour.
     """
 
     role: str
@@ -48,6 +49,7 @@ class Texture:
     raw: bool = False
     opaque: bool = False
     use: str = field(default="", compare=False)
+    nearest: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def textures_of(material: MaterialSpec) -> tuple[Texture, ...]:
             matrix=(su, 0.0, ou, 0.0, sv, 1.0 - sv - ov),
             uv_set=spec.uv_set,
             wrap=(spec.wrap, spec.wrap),
-            strength=spec.strength if role == "normal" else 1.0,
+            strength=spec.strength if role in ("normal", "bump") else 1.0,
             use=f"material.textures.{role}",
         )
         for role, path in spec.pictures().items()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from quiltcli.errors import MeshError, Problem, SceneError
+from quiltcli.scene.environment.sky import sky_of
 from quiltcli.scene.load import lights_in, load_objects, scene_of, wants_lights
 from quiltcli.scene.objects import Brought, SceneObject
 from quiltcli.scene.scene import Scene, facing_anywhere
@@ -72,6 +73,7 @@ class MovingScene:
             scene = self._posed(last.scene, brought)
         else:
             scene = covered(scene_of(self.spec, self.objects, brought), self.store)
+            scene = replace(scene, sky=self.base.sky)
         self._last[:] = [_Last(brought, scene)]
         return scene
 
@@ -131,5 +133,8 @@ def load_moving_scene(
     """
     objects = load_objects(spec)
     base = covered(scene_of(spec, objects, [one.start for one in objects]), store)
+    seen = next((light for light in spec.lights if light.type == "environment" and light.visible), None)
+    if seen is not None and store is not None:
+        base = replace(base, sky=sky_of(seen, store))
     moves = any(item.moves for item in spec.objects)
     return base, MovingScene(spec, objects, base, fps, store) if moves else None

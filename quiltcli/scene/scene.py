@@ -13,6 +13,7 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, c
 from quiltcli.scene.lights import Light
 
 if TYPE_CHECKING:
+    from quiltcli.scene.environment.sky import Sky
     from quiltcli.scene.materials import Texture
     from quiltcli.scene.textures.pool import Textures
 
@@ -80,8 +81,11 @@ class Scene:
             that for the others; NaN where nobody knows, None where nothing moves or nobody asks.
         opacities: (V,) alpha of vertices, 0 to 1; None where all are 1.
         uv1: (V, 2) those of the second set, likewise.
+        turns: (V, 3) how tangents of the files lie to those that are made (`tangents.turns_of`); None for
+            alike.
         textures: the pictures that surfaces are covered with; None where there are none, and in a scene that
             was loaded to be looked into, not to be drawn.
+        sky: what is seen where nothing is hit instead of `background`; None for that.
     """
 
     vertices: FloatArray
@@ -105,6 +109,8 @@ class Scene:
     opacities: Float32Array | None = None
     uv1: FloatArray | None = None
     textures: Textures | None = None
+    sky: Sky | None = None
+    turns: Float32Array | None = None
 
     @cached_property
     def named(self) -> Int32Array:

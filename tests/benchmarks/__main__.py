@@ -19,6 +19,7 @@ from tests.benchmarks import (
     curves,
     duels,
     meshes,
+    moving,
     opengl,
     page,
     rings,
@@ -31,7 +32,18 @@ from tests.benchmarks import (
 from tests.benchmarks.race import canary, crowding
 
 ROOT = Path(__file__).parents[2]
-PARTS = ("duels", "textures", "shadows", "sequences", "facets", "sorting", "pixels", "triangles", "rings")
+PARTS = (
+    "duels",
+    "textures",
+    "shadows",
+    "moving",
+    "sequences",
+    "facets",
+    "sorting",
+    "pixels",
+    "triangles",
+    "rings",
+)
 
 
 @click.command(help=__doc__)
@@ -112,6 +124,9 @@ def _measure(
             for name in ("mixed",) if quick else textured.SCENES:
                 results.setdefault("shadows", {})[name] = shadowed.measure(name, rounds)
                 keep(f"shadows, {name}")
+        if "moving" in parts:
+            results["moving"] = moving.measure(rounds, Path(scratch), quick=quick)
+            keep("moving")
         if "sequences" in parts:
             for compression in ("zip",) if quick else ("zip", "zstd"):
                 one = sequence.measure(meshes.detailed(3), 4 if quick else 20, compression, Path(scratch))
@@ -145,6 +160,8 @@ def _tell(results: Mapping[str, Any], clock: str) -> None:
         click.echo("\n" + tables.texture_table(results))
     if "shadows" in results:
         click.echo("\n" + tables.shadow_table(results))
+    if "moving" in results:
+        click.echo("\n" + "\n".join(moving.told(results["moving"])))
     if "sequences" in results:
         click.echo("\n" + tables.sequence_table(results))
     if "rings" in results:

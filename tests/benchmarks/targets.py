@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tests.benchmarks import rings
+from tests.benchmarks.moving import EARLY
 from tests.benchmarks.race import ratio
 from tests.benchmarks.shadowed import cost
 
@@ -41,8 +42,22 @@ def targets(results: Mapping[str, Any]) -> list[Target]:
         for kind in ("a sun", "a point", "two points"):
             what = f"shadows of {kind}, a pixel and lamp"
             found.append(Target(what, f"{name}/cube", cost(one, kind), 250, " ns"))
+    found += _moving(results.get("moving", {}))
     found += _rings(results.get("rings", {}))
     return [target for target in found if not math.isnan(target.value)]
+
+
+def _moving(found: Mapping[str, Any]) -> Iterator[Target]:
+    """Scenes that move, and memory."""
+    if not found:
+        return
+    value = ratio(found["times"], "moving", "still", "cpu")
+    yield Target("a frame in which all turns / a still one, 2 workers", "balls/cube", value, 1.15)
+    memory = found["sequence"]
+    what = f"memory after {memory['frames']} numbered meshes / after {EARLY}"
+    yield Target(what, "ball/cube", memory["last"] / memory["early"], 1.05)
+    few, many = (found["samples"][key] for key in sorted(found["samples"], key=int))
+    yield Target("memory, 64 samples / 4", "room/cube", many / few, 1.2)
 
 
 def _rings(found: Mapping[str, Any]) -> Iterator[Target]:
@@ -116,5 +131,8 @@ def _textures(scenes: Mapping[str, Any]) -> Iterator[Target]:
     for name, times in scenes.items():
         value = ratio(times, "trilinear", "plain", "cpu")
         yield Target("textured frame, trilinear / plain", f"{name}/cube", value, 2.5)
+        if name == "room":
+            value = ratio(times, "large, 16 samples", "large", "cpu")
+            yield Target("untextured frame, 16 samples / 1", f"{name}/cube, 4096²", value, 6.0)
         value = ratio(times, "anisotropic, 16 samples", "anisotropic", "cpu")
         yield Target("textured frame, 16 samples / 1", f"{name}/cube", value, 12.0)

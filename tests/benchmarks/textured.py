@@ -26,6 +26,8 @@ from tests.benchmarks.stages import DENSITY, binned, cube, stage_for, viewer_of
 
 PAGE = 2048
 """Pixels of the quilt from side to side."""
+LARGE = 2 * PAGE
+"""The same of a CAVE, on which samples that see one triangle count more than those on rims."""
 _TEXELS = 2048
 _REPEAT = 1.5  # metres that the picture spans
 
@@ -58,6 +60,12 @@ def measure(name: str, rounds: int, scratch: Path) -> dict[str, Any]:
             ends.enter_context(quilt)
             contestants["opengl plain"] = partial(quilt.draw, "ggx")
             contestants["opengl trilinear"] = partial(quilt.draw, "textured")
+        if name == "room":
+            wide = cube(DENSITY * LARGE / 8192)
+            large = stage_for(wide, SCENES[name](), (LARGE, LARGE))
+            eye, sheets = viewer_of(wide), new_buffers(large)
+            contestants["large"] = partial(draw_frame, large, eye, sheets)
+            contestants["large, 16 samples"] = partial(draw_frame, _sampled(large, 16), eye, sheets)
         brief = [kind for kind in contestants if "samples" in kind]
         times = race(contestants, rounds, cold=brief, brief=brief)
     return {"pixels": pixels, "times": times}

@@ -13,9 +13,12 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
+from quiltcli.analysis.ring.eye import camera_at
+from quiltcli.analysis.ring.simulate import eye_place
 from quiltcli.cli.group import main
 from quiltcli.errors import OutputError
 from quiltcli.exchange.web.turning import Turning, turning_view
+from quiltcli.geometry import dot
 from tests.helpers.chromium import look
 from tests.helpers.ring_job import ring_job
 
@@ -76,3 +79,35 @@ def test_a_browser_shows_it(out: Path, tmp_path: Path) -> None:
     assert seen.console == []
     assert "a turn of the mirror" in seen.title
     assert seen.pixels[60:280].max() > 60  # of the picture, not of the words below it
+
+
+def azimuth_after(out: Path, folder: Path, deeds: str) -> float:
+    """Azimuth that the caption tells, degrees, after a script was run in a page of 24 views."""
+    page = turning_view(out, None, folder / "deeds.html", Turning(views=24, size=(64, 48)))
+    text = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", page.read_text())
+    page.write_text(text.replace("</body>", f"<script>{deeds}</script></body>"))
+    seen = look(page, "", 400, 400, folder)
+    assert seen.console == []
+    found = re.search(r"frame 3, from ([\d.]+)°", seen.text)
+    assert found is not None
+    return float(found[1])
+
+
+def test_it_turns_by_itself(out: Path, tmp_path: Path) -> None:
+    assert azimuth_after(out, tmp_path, "") != 0
+
+
+def test_what_is_in_front_follows_the_hand_and_arrows_walk(out: Path, tmp_path: Path) -> None:
+    """An eye that goes a little to its left, to a greater azimuth, sees what is in front go to the right."""
+    eye = camera_at(eye_place((5, 0, 1)), 0.07, (64, 48))
+    assert dot(np.array([0.04, 0, 0]) - eye.eye, eye.right) > 0
+    deeds = (
+        'const canvas = document.getElementById("picture"); canvas.setPointerCapture = () => {};'
+        "const wide = canvas.clientWidth;"
+        'for (const [kind, x] of [["down", 0], ["move", wide / 12], ["up", wide / 12]])'
+        ' canvas.dispatchEvent(new PointerEvent("pointer" + kind, {clientX: x}));'
+        'for (const key of ["ArrowLeft", "ArrowLeft", "ArrowRight"])'
+        ' canvas.dispatchEvent(new KeyboardEvent("keydown", {key}));'
+    )
+    # One of 24 places by hand, two to the left and one to the right again.
+    assert azimuth_after(out, tmp_path, deeds) == 30

@@ -33,11 +33,12 @@ FLAGS = (
 
 @dataclass(frozen=True)
 class Seen:
-    """A page after it was drawn: its title, its picture, and what went to the console."""
+    """A page after it was drawn: its title, its picture, what went to the console, and its text."""
 
     title: str
     pixels: np.ndarray
     console: list[str]
+    text: str = ""
 
 
 def chromium() -> str:
@@ -60,4 +61,6 @@ def look(page: Path, settings: str, width: int, height: int, folder: Path) -> Se
     title = re.search("<title>(.*?)</title>", done.stdout, re.DOTALL)
     assert title, f"the browser has shown no page: {done.stderr[-2000:]}"
     pixels = np.asarray(Image.open(picture).convert("RGB"))[:height, :width]
-    return Seen(title[1], pixels, [line for line in done.stderr.splitlines() if "CONSOLE" in line])
+    return Seen(
+        title[1], pixels, [line for line in done.stderr.splitlines() if "CONSOLE" in line], done.stdout
+    )

@@ -169,3 +169,16 @@ def test_every_sample_is_shaded_where_a_job_asks_for_that(settled):
     assert other.sum() > 100
     errors = [np.sqrt(np.mean((found - truth)[other] ** 2)) for found in (once, each)]
     assert errors[1] < 0.5 * errors[0]
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("samples", [5, 16])
+def test_what_is_written_at_once_is_the_mean_of_its_sum_to_the_last_bit(name, samples, monkeypatch):
+    scene, facets, eye = SCENES[name](), cube(density=50), viewer((1.9, 1.4, 2.6))
+    at_once = drawn(scene, samples, facets, eye)
+    real = antialiasing.add_samples
+    monkeypatch.setattr(antialiasing, "add_samples", lambda *given: real(*given[:5]))
+    summed = drawn(scene, samples, facets, eye)
+    for layer, values in summed.items():
+        kind = np.uint16 if values.itemsize == 2 else np.uint32
+        np.testing.assert_array_equal(at_once[layer].view(kind), values.view(kind), err_msg=layer)

@@ -74,9 +74,7 @@ def test_objects_without_texture_coordinates_have_none(tmp_path):
 
 
 def test_images_stay_with_their_materials(tmp_path):
-    written(
-        tmp_path, "m.mtl", "newmtl a\nKd 1 1 1\nmap_Kd -s 2 2 a b.png\nmap_Bump n.png\nnewmtl b\nKd 1 1 1\n"
-    )
+    written(tmp_path, "m.mtl", "newmtl a\nKd 1 1 1\nmap_Kd -s 2 2 a b.png\ndisp n.png\nnewmtl b\nKd 1 1 1\n")
     text = "mtllib m.mtl\n" + SQUARE + "vt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1/1 3/1 4/1\n"
     mesh = written(tmp_path, "m.obj", text)
     Image.new("RGB", (2, 2)).save(tmp_path / "a b.png")
@@ -84,12 +82,12 @@ def test_images_stay_with_their_materials(tmp_path):
     textures = scene.materials.textures[scene.material[-1]]
     assert [(t.role, t.picture.path, t.matrix) for t in textures] == [
         ("color", str(tmp_path / "a b.png"), (2, 0, 0, 0, 2, -1)),
-        ("bump", str(tmp_path / "n.png"), (1, 0, 0, 0, 1, 0)),
+        ("displacement", str(tmp_path / "n.png"), (1, 0, 0, 0, 1, 0)),
     ]
     assert scene.materials.textures[scene.material[0]] == ()
-    assert scene.notices[0] == "m: 1 texture not drawn (bump)"
+    assert scene.notices[0] == "m: 1 texture not drawn (displacement)"
     part = read_asset(mesh).parts[-1]
-    assert [t.role for t in part.surface.overridden({"color": (1, 0, 0)}).textures] == ["bump"]
+    assert [t.role for t in part.surface.overridden({"color": (1, 0, 0)}).textures] == ["displacement"]
 
 
 def test_roughness_and_metal_of_the_pbr_statements_win(tmp_path):

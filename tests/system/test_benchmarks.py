@@ -22,7 +22,7 @@ def test_every_measurement_can_be_imported(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("part", ["duels", "textures", "shadows", "sequences", "facets", "sorting"])
+@pytest.mark.parametrize("part", ["duels", "textures", "shadows", "moving", "sequences", "facets", "sorting"])
 def test_measurements_print_their_targets(tmp_path: Path, part: str) -> None:
     command = [sys.executable, "-m", "tests.benchmarks", "--quick", "--rounds", "1", "--only", part]
     done = subprocess.run(

@@ -26,7 +26,7 @@ from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
 from quiltcli.render.antialiasing import in_quilt, sample_places
 from quiltcli.render.batch import put_layers
-from quiltcli.render.buffers import Buffers, clear, lay_background
+from quiltcli.render.buffers import Buffers, background_of, clear, lay_background, lay_sky
 from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage
@@ -73,7 +73,8 @@ def cast_frame(
     light = summed(channels) if count > 1 else ()
     data = tuple(name for name in channels if name not in light)
     clear(stage, buffers, only)
-    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers, rays)
+    blocks = np.flatnonzero(rays.lit[stage.blocks.facet])
+    lay_background(stage, blocks, buffers, rays)
 
     def seen(pixels: Places, sample: Sample = CENTRE) -> tuple[Hits, Iterable[Layer]]:
         """What pixels see at once, and what others of them see through something."""
@@ -92,7 +93,7 @@ def cast_frame(
         if hits.triangle.size:
             fill(buffers, data, gaze, Shaded(scene, viewer.eye, hits))
         inside = hits.inside + put_layers(
-            found, sums_of(address, summed(data)), buffers, data, gaze, scene.background
+            found, sums_of(address, summed(data)), buffers, data, gaze, background_of(stage, rays)
         )
         if light and address.size:
             add_light(address)
@@ -107,10 +108,11 @@ def cast_frame(
                 sums.add(Shaded(scene, viewer.eye, hits, sample=sample))
             for layer in found:
                 sums.add(layer.shaded, layer.weight)
-        sums.store(buffers, count, scene.background)
+        sums.store(buffers, count, background_of(stage, rays))
 
     with ThreadPoolExecutor(threads) as pool:
         visible = sum(pool.map(draw, pixels_of(stage, rays.lit)))
+    lay_sky(stage, blocks, buffers, rays)
     return FrameRecord(
         frame=viewer.frame,
         triangles=int(np.count_nonzero(target.drawn)),

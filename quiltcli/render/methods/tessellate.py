@@ -21,7 +21,7 @@ from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray, cross
 from quiltcli.projection.camera import raster_display
 from quiltcli.projection.gaze import Gaze
 from quiltcli.projection.planar import viewer_rays
-from quiltcli.render.buffers import Buffers, clear, lay_background, new_buffers
+from quiltcli.render.buffers import Buffers, clear, lay_background, lay_sky, new_buffers
 from quiltcli.render.frame import draw_frame
 from quiltcli.render.methods.raycast import pixels_of
 from quiltcli.render.report import FrameRecord
@@ -67,7 +67,8 @@ def draw_tessellated(
         lit &= only
     clear(stage, buffers, only)
     rays = viewer_rays(stage.layout, stage.facets, lit, viewer)
-    lay_background(stage, np.flatnonzero(rays.lit[stage.blocks.facet]), buffers, rays)
+    blocks = np.flatnonzero(rays.lit[stage.blocks.facet])
+    lay_background(stage, blocks, buffers, rays)
     target = aim(stage.scene.vertices, stage.scene.triangles, viewer, stage.job.render.backface_culling)
     sloped = stage.scene.textures is not None
     threshold, pieces, visible = stage.job.render.threshold or THRESHOLD, 0, 0
@@ -116,6 +117,7 @@ def draw_tessellated(
                     Shaded(stage.scene, viewer.eye, hits),
                 )
             visible += hits.inside
+    lay_sky(stage, blocks, buffers, rays)
     return FrameRecord(
         frame=viewer.frame,
         triangles=int(np.count_nonzero(target.drawn)),

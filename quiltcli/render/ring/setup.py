@@ -142,8 +142,8 @@ def set_ring_stage(job: JobFile, frames: Sequence[int] | None = None) -> RingSta
     compensate = job.halftone is not None and job.halftone.compensate == "dwell"
     shortest = shortest_dwell(rig) if compensate else 1.0
     raise_all(JobError, _foreign(job))
-    if scene.soft is not None:
-        words = "has surfaces that light passes, which a 360° light field display does not show yet"
+    if scene.soft is not None and job.render.method == "raycast":
+        words = "has surfaces that light passes, which rays do not show (expected method exact or vertex)"
         raise SceneError(Problem(words, file=str(job.scene)))
     stage = RingStage(job, display, job.ring, rig, scene, source, shortest, photographs)
     problems: list[Problem] = []

@@ -15,7 +15,7 @@ import numpy as np
 from quiltcli.errors import MeshError, Problem
 from quiltcli.formats.gltf import Gltf, Material, read_gltf
 from quiltcli.formats.gltf.animation import chosen_clips
-from quiltcli.formats.gltf.model import Clip
+from quiltcli.formats.gltf.model import Clip, Primitive
 from quiltcli.formats.gltf.posing import (
     Piece,
     Placed,
@@ -32,6 +32,7 @@ from quiltcli.scene.importers.model import NO_SUBDIVISION, FileLight, Playing, t
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.materials import Surface, Texture
 from quiltcli.scene.textures.picture import Picture
+from quiltcli.scene.textures.tangents import turns_of
 
 LUMENS_PER_WATT = 683.0
 _SLOTS = {
@@ -198,7 +199,23 @@ def _part(gltf: Gltf, piece: Piece, there: Placed, mirrored: BoolArray) -> Part:
         uv1=_v_up(primitive.uv[1], piece.copies),
         material=gltf.materials[primitive.material].name,
         opacities=opacities,
+        turns=_turns(gltf.materials[primitive.material], primitive, piece.copies),
     )
+
+
+def _turns(material: Material, primitive: Primitive, copies: int) -> Float32Array | None:
+    """How the primitive's own tangents lie to those that would be made for its normal map, in all copies."""
+    use = material.textures.get("normal")
+    if use is None or primitive.tangents is None or primitive.normals is None:
+        return None
+    uv = primitive.uv[use.uv_set]
+    if uv is None:
+        return None
+    u, v = uv[primitive.triangles].transpose(2, 1, 0)
+    a, b, c, d, e, f = use.matrix
+    places = np.stack((a * u + b * v + c, d * u + e * v + f))
+    found = turns_of(primitive.tangents, primitive.positions, primitive.triangles, primitive.normals, places)
+    return np.tile(found, (copies, 1))
 
 
 def _v_up(uv: FloatArray | None, copies: int) -> FloatArray | None:
@@ -237,6 +254,7 @@ def _textures(gltf: Gltf, material: Material) -> Iterator[Texture]:
                 wrap=(wrap_u, wrap_v),
                 strength=use.strength,
                 channel=channel,
+                nearest=use.nearest,
                 use=f"material {_name(material)}, {_SLOTS[slot]}",
             )
 

@@ -25,6 +25,7 @@ class Part:
         uv1: (V, 2) those of the second set, likewise.
         material: name of its material, empty where the file gives none.
         opacities: (V,) alpha, or None.
+        turns: (V, 3) how the file's tangents lie (`textures.tangents.turns_of`), or None.
     """
 
     vertices: FloatArray
@@ -37,6 +38,7 @@ class Part:
     uv1: FloatArray | None = None
     material: str = ""
     opacities: Float32Array | None = None
+    turns: Float32Array | None = None
 
 
 def placed(part: Part, matrix: FloatArray) -> Part:

@@ -20,14 +20,15 @@ from numpy.typing import NDArray
 
 from quiltcli.errors import Problem, SceneError
 from quiltcli.formats.capacity import bytes_text
-from quiltcli.geometry import Float32Array, FloatArray, Int32Array, IntArray
+from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from quiltcli.scene.materials import Texture
 from quiltcli.scene.scene import Scene
+from quiltcli.scene.textures.heights import normals_of
 from quiltcli.scene.textures.levels import Texels, level_sizes, levels_of
 from quiltcli.scene.textures.picture import Picture
 
-ROLES = ("color", "emission", "metallic", "roughness", "normal", "occlusion", "opacity")
-"""What textures vary that are drawn."""
+ROLES = ("color", "emission", "metallic", "roughness", "normal", "occlusion", "opacity", "bump")
+"""What textures vary that are drawn; heights (`bump`) are made normals of, and are looked up as these."""
 IN_SRGB = ("color", "emission")
 """Roles of textures whose numbers are encoded for displays."""
 WRAPS = ("repeat", "clamp", "mirror")
@@ -58,6 +59,8 @@ class Sheet:
     picture: Picture
     srgb: bool
     wrap: tuple[str, str]
+    nearest: bool = False
+    heights: bool = False
     opaque: bool = False
 
 
@@ -110,6 +113,7 @@ class Textures:
         slots: by role, those that some material has.
         lays: how they lie; slots whose textures lie alike share one.
         anisotropy: the most places that one pixel looks at.
+        nearest: (I,) images whose texels are squares of one colour where they are enlarged; None for none.
     """
 
     texels: NDArray[np.uint64]
@@ -122,6 +126,7 @@ class Textures:
     slots: Mapping[str, Slot]
     lays: tuple[Lay, ...]
     anisotropy: int
+    nearest: BoolArray | None = None
 
 
 def mean_texels(scene: Scene, role: str) -> Float32Array:
@@ -165,7 +170,8 @@ class TextureStore:
 def sheet_of(texture: Texture) -> Sheet:
     """The texels that a texture is looked up in."""
     srgb = texture.role in IN_SRGB and not texture.raw
-    return Sheet(texture.picture, srgb, texture.wrap, texture.opaque)
+    heights = texture.role == "bump"
+    return Sheet(texture.picture, srgb, texture.wrap, texture.nearest, heights, texture.opaque)
 
 
 def check_textures(textures: Iterable[Texture], limits: TextureLimits | None = None) -> None:
@@ -233,6 +239,7 @@ def _filled(
     for row, (sheet, texture) in enumerate(first_use.items()):
         _write(texels, offset[start[row] :], sizes[row], sheet, texture)
     rows = {sheet: row for row, sheet in enumerate(first_use)}
+    squares = np.array([sheet.nearest for sheet in first_use])
     slots, lays = _slots(materials, rows)
     return Textures(
         texels=texels,
@@ -245,6 +252,7 @@ def _filled(
         slots=slots,
         lays=lays,
         anisotropy=limits.anisotropy,
+        nearest=squares if squares.any() else None,
     )
 
 
@@ -259,6 +267,8 @@ def _write(
     pixels = sheet.picture.pixels(texture.use)
     if sheet.opaque and pixels.shape[2] in (2, 4):
         pixels = pixels[..., :-1]
+    if sheet.heights:
+        pixels = normals_of(pixels, sheet.wrap)
     srgb = sheet.srgb and pixels.dtype.kind == "u"
     row = 0
     for level in levels_of(pixels, srgb=srgb):
@@ -292,8 +302,10 @@ def _slots(
     lays: list[list[Texture | None]] = []
     for role in ROLES:
         # Of several in one material the last counts, as in the file.
-        found = [next((t for t in reversed(textures) if t.role == role), None) for textures in materials]
-        if not any(found):
+        found = [_last_of(textures, role) for textures in materials]
+        if role == "normal":
+            found = [own or _last_of(each, "bump") for own, each in zip(found, materials, strict=True)]
+        if role == "bump" or not any(found):
             continue
         number = next((k for k, lay in enumerate(lays) if all(map(_lie_alike, found, lay))), len(lays))
         if number == len(lays):
@@ -306,10 +318,19 @@ def _slots(
             image=next(same, image),
             channel=np.array([0 if t is None else "rgba".find(t.channel or "r") for t in found], np.int32),
             gain=np.array([(0, 1) if t is None else t.gain for t in found], dtype=np.float32),
-            strength=np.array([1 if t is None else t.strength for t in found], dtype=np.float32),
+            strength=np.array([1 if t is None else _strength(t) for t in found], dtype=np.float32),
             lay=number,
         )
     return slots, tuple(map(_lay, lays))
+
+
+def _strength(texture: Texture) -> float:
+    """The factor of a texture; a gain of heights makes slopes steeper."""
+    return texture.strength * (texture.gain[1] if texture.role == "bump" else 1.0)
+
+
+def _last_of(textures: Sequence[Texture], role: str) -> Texture | None:
+    return next((texture for texture in reversed(textures) if texture.role == role), None)
 
 
 def _lie_alike(a: Texture | None, b: Texture | None) -> bool:

@@ -18,7 +18,8 @@ from quiltcli.shading.textures.ellipse import between_levels, ellipses
 
 _CHUNK = 1 << 14  # places that fit the cache
 _ONE, _HALF = np.float32(1), np.float32(0.5)
-_TWO_LEVELS, _WRAP = np.uint16(128), np.uint16(256)  # of numbers for how places are filtered
+# Of numbers for how places are filtered.
+_TWO_LEVELS, _WRAP, _NEAREST = np.uint16(128), np.uint16(256), np.uint16(16 * 256)
 # A half float's bits, moved to where a single's are, are its value times 2⁻¹¹². The weights make up for it:
 # a product of two small numbers would be denormal, which is ten times as slow.
 _SCALE = np.float32(2.0**112)
@@ -88,6 +89,8 @@ def _filtered(
     # the ellipse they look at, and whether in one level or in two.
     kind = seen.places + _TWO_LEVELS * (share > 0)
     kind += _WRAP * (3 * wrap[:, 0] + wrap[:, 1]).astype(np.uint16)
+    if textures.nearest is not None:
+        kind += _NEAREST * (textures.nearest.take(image) & (seen.places == 0))
     count = np.bincount(kind)
     present = np.flatnonzero(count).tolist()
     order = np.argsort(kind, kind="stable") if len(present) > 1 else np.arange(kind.size)
@@ -95,7 +98,8 @@ def _filtered(
     for which in present:
         start, end = end, end + int(count[which])
         some = order[start:end] if len(present) > 1 else slice(None)
-        code, rest = divmod(which, int(_WRAP))
+        squares, code = divmod(which, int(_NEAREST))
+        code, rest = divmod(code, int(_WRAP))
         two, places = divmod(rest, int(_TWO_LEVELS))
         along = _Along(u[some], v[some], divmod(code, 3))
         if places > 1:
@@ -108,19 +112,24 @@ def _filtered(
         if two:
             part = share[some] * weight
             weighted = [(weighted[0][0], weight - part), (_levels(textures, rows + 1), part)]
+        along.squares = bool(squares)
         for k, values in enumerate(_sum(textures, along, max(places, 1), weighted, channels)):
             out[k, some] = values
 
 
 @dataclass
 class _Along:
-    """Places and the longer axes of their ellipses, with how the texture goes on along u and v."""
+    """Places and the longer axes of their ellipses, with how the texture goes on along u and v.
+
+    Where its texels are `squares`, they are not blended.
+    """
 
     u: Float32Array
     v: Float32Array
     wrap: tuple[int, int]
     du: Float32Array | None = None
     dv: Float32Array | None = None
+    squares: bool = False
 
     def at(self, share: np.float32) -> tuple[Float32Array, Float32Array]:
         """Places so far along, from 0 to 1."""
@@ -159,6 +168,12 @@ def _sum(
     for place in range(places):
         u, v = along.at(np.float32((place + 0.5) / places - 0.5))
         for level, weight in levels:
+            if along.squares:
+                # The middle of a texel has the texel's own colour.
+                u, v = (
+                    (np.floor(each * size) + _HALF) / size
+                    for each, size in ((u, level.width), (v, level.height))
+                )
             _add_bilinear(textures.texels, level, u, v, weight, channels, total)
     return total
 

@@ -48,7 +48,7 @@ def test_the_same_materials_have_the_same_textures(tmp_path):
     used = [(texture(saved(tmp_path / "a.png", np.zeros((2, 2, 3)))),)]
     assert store.of(used) is store.of(list(used))
     assert store.of([()]) is None
-    assert store.of([(texture("nowhere.png", "bump"),)]) is None
+    assert store.of([(texture("nowhere.png", "displacement"),)]) is None
 
 
 def test_large_pictures_are_reduced(tmp_path):
@@ -84,12 +84,12 @@ def test_a_picture_that_cannot_be_read_is_an_error_naming_material_and_file(tmp_
 
 
 def test_a_picture_that_a_scene_replaces_is_not_looked_for(tmp_path):
-    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd nowhere.png\nmap_Bump none.png\n")
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd nowhere.png\ndisp none.png\n")
     (tmp_path / "m.obj").write_text("mtllib m.mtl\n" + QUAD)
     scene = tmp_path / "s.yaml"
     scene.write_text("quilt_scene: 1\nobjects:\n- {mesh: m.obj, material: {color: [1, 0, 0]}}\n")
     loaded = load_scene(scene)
-    assert loaded.notices[0] == "m: 1 texture not drawn (bump)"
+    assert loaded.notices[0] == "m: 1 texture not drawn (displacement)"
 
 
 def test_triangles_without_texture_coordinates_are_told(tmp_path):

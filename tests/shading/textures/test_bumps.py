@@ -125,3 +125,65 @@ def test_rays_see_the_same_bent_normals(tmp_path):
         pictures.append(frame.stack(1, ("N.X", "N.Y", "N.Z", "R")).astype(np.float64))
     np.testing.assert_allclose(pictures[0], pictures[1], atol=4e-3)
     assert np.ptp(pictures[0][..., 0]) > 0.3
+
+
+def hills(folder, statement="map_Bump -bm 2", size=64, kind="slope"):
+    """A wall with a picture of heights, and what MTL says of it."""
+    x = (np.arange(size) + 0.5) / size
+    height = np.tile(x, (size, 1)) if kind == "slope" else np.tile((1 + np.sin(2 * np.pi * x)) / 2, (size, 1))
+    image = OpenImageIO.ImageBuf(np.rint(height * 65535).astype(np.uint16)[..., None])
+    assert image.write(str(folder / "h.png"))
+    (folder / "m.mtl").write_text(f"newmtl a\n{statement} h.png\n")
+    return "mtllib m.mtl\n" + WALL + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3 4/4\n"
+
+
+def of_mesh(folder, mesh):
+    seen_normals(folder, mesh, keys="", name="h.png")
+    (folder / "s.yaml").write_text("quilt_scene: 1\nobjects: [{mesh: m.obj}]\n")
+    (frame,) = quiltcli.draw(folder / "j.yaml", threads=1)
+    picture = frame.facet(1)
+    return np.stack([picture[f"N.{axis}"] for axis in "XYZ"], axis=-1).astype(np.float64), picture["A"] > 0
+
+
+@pytest.mark.parametrize(("statement", "steep"), [("map_Bump -bm 2", 2), ("bump", 1), ("bump -mm 0 3", 3)])
+def test_heights_tilt_normals_by_their_slope(tmp_path, statement, steep):
+    """White is a hundredth of the picture's width above black, times -bm: a ramp is tilted by as much."""
+    normals, shown = of_mesh(tmp_path, hills(tmp_path, statement))
+    expected = np.array([-0.01 * steep, 0, 1])
+    expected /= np.linalg.norm(expected)
+    # Where the picture comes again, at the ramp's end, it falls.
+    inner = np.zeros_like(shown)
+    inner[6:-6, 6:-6] = shown[6:-6, 6:-6]
+    np.testing.assert_allclose(normals[inner], np.tile(expected, (inner.sum(), 1)), atol=1e-3)
+
+
+def test_heights_of_the_scene_file_and_a_wave(tmp_path):
+    mesh = hills(tmp_path, kind="wave").replace("mtllib m.mtl\n", "")
+    (tmp_path / "m.obj").write_text(mesh)
+    seen_normals(tmp_path, mesh, name="h.png")
+    (tmp_path / "s.yaml").write_text(
+        "quilt_scene: 1\nobjects: [{mesh: m.obj, material: {textures: {bump: h.png, strength: 20}}}]\n"
+    )
+    (tmp_path / "j.yaml").write_text((tmp_path / "j.yaml").read_text().replace("[rgba, N]", "[rgba, N, uv]"))
+    (frame,) = quiltcli.draw(tmp_path / "j.yaml", threads=1)
+    picture = frame.facet(1)
+    shown = picture["A"] > 0
+    slope = -20 * 0.01 * np.pi * np.cos(2 * np.pi * picture["uv.U"][shown].astype(float))
+    np.testing.assert_allclose(picture["N.X"][shown], slope / np.sqrt(1 + slope**2), atol=0.02)
+    np.testing.assert_allclose(picture["N.Y"][shown], 0, atol=1e-3)
+
+
+def test_a_normal_map_that_is_called_a_bump_is_a_normal_map(tmp_path):
+    mesh = hills(tmp_path)
+    written = flat_map(tmp_path / "h.png", (0.1, 0.05, 0.99))
+    normals, shown = of_mesh(tmp_path, mesh.replace("-bm 2", ""))
+    (tmp_path / "m.mtl").write_text("newmtl a\nbump h.png\n")
+    normals, shown = of_mesh(tmp_path, mesh)
+    expected = written / np.linalg.norm(written)
+    np.testing.assert_allclose(normals[shown], np.tile(expected, (shown.sum(), 1)), atol=2e-3)
+
+
+def test_one_kind_of_slopes_is_enough(tmp_path):
+    flat_map(tmp_path / "n.png", TILT)
+    with pytest.raises(quiltcli.QuiltError, match="cannot stand beside normal"):
+        seen_normals(tmp_path, WALL + "f 1 2 3 4\n", keys=", bump: n.png")

@@ -1,5 +1,7 @@
 """Looking up: between texels, between levels and along footprints, against what can be written down."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -142,3 +144,17 @@ def test_a_place_has_one_value_whatever_is_looked_up_with_it():
     some = dice.permutation(n)[:999]
     alone = look_up(textures, image[:1], u[some], v[some], slopes[:, some], (2,))
     assert alone[0].tobytes() == together[1, some].tobytes()
+
+
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+def test_squares_are_not_blended_where_they_are_enlarged(wrap):
+    texels = np.random.default_rng(4).uniform(0, 1, (5, 7, 4)).astype(np.float16).astype(np.float32)
+    squares = replace(pool(texels, (wrap, wrap)), nearest=np.array([True]))
+    u, v = np.random.default_rng(5).uniform(-1.5, 2.5, (2, 400)).astype(np.float32)
+    found = looked_up(squares, u, v)
+    column, row = np.floor(u.astype(float) * 7).astype(int), np.floor(v.astype(float) * 5).astype(int)
+    expected = texels[folded(row, 5, wrap), folded(column, 7, wrap)].T
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+    # Reduced, they are averaged as others are.
+    small = looked_up(squares, u, v, (3, 0, 0, 3))
+    np.testing.assert_array_equal(small, looked_up(pool(texels, (wrap, wrap)), u, v, (3, 0, 0, 3)))

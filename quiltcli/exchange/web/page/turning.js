@@ -61,8 +61,8 @@
   });
   canvas.addEventListener("pointermove", (event) => {
     if (held === null) return;
-    // The width of the picture is half a way around.
-    walk((-(event.clientX - held) / canvas.clientWidth) * 0.5 * pictures[turn].length);
+    // What is in front follows the hand, for azimuths grow to an eye's left; the width is half a way around.
+    walk(((event.clientX - held) / canvas.clientWidth) * 0.5 * pictures[turn].length);
     held = event.clientX;
   });
   for (const end of ["pointerup", "pointercancel"]) {
@@ -71,7 +71,7 @@
     });
   }
   canvas.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    const step = { ArrowLeft: 1, ArrowRight: -1 }[event.key];
     if (!step) return;
     event.preventDefault();
     alone = false;
