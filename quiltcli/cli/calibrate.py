@@ -27,6 +27,7 @@ from quiltcli.cli.options import OVERWRITE, PATH, POINT, refuse_typed
     metavar="3x2,40mm,10mm,4x4,20=1-3",
     help="Board of markers fixed to facets: across x down, side, gap, dictionary, first id, facets.",
 )
+@click.option("--rig", type=PATH, help="The rig.json of an earlier report: photos show its boards alone.")
 @click.option(
     "--distance", "distances", multiple=True, metavar="1A-3C=1.532m", help="Measured between two corners."
 )
@@ -101,13 +102,11 @@ def _by_panels(inputs: tuple[Path, ...], display: Path, output: Path, how: dict[
         raise click.UsageError("expected photos, or one table of corners, not both")
     if tables:
         refuse_typed("beside a table of corners", but=("inputs", "display", "output", "units", "overwrite"))
+        lines, texts = _from_corners(spec, facets, tables[0], mesh, how)
     else:
         refuse_typed("beside photos", ("units", "tolerance", "as_json"))
-    lines, texts = (
-        _from_corners(spec, facets, tables[0], mesh, how)
-        if tables
-        else (_from_photos(spec, facets, inputs, mesh, how))
-    )
+        from_these = _from_photos if how["rig"] is None else _from_rig
+        lines, texts = from_these(spec, facets, inputs, mesh, how)
     paths = [output.with_name(name) if name else output for name in texts]
     taken = [
         Problem("exists already (--overwrite replaces it)", file=str(path)) for path in paths if path.exists()
@@ -143,6 +142,24 @@ def _from_corners(
         click.echo(f"note: {notice}", err=True)
     found = fit_corners(spec, facets, corners, mesh)
     return list(corner_table(facets, found.residual)), found.files
+
+
+def _from_rig(
+    spec: Any, facets: Any, photos: tuple[Path, ...], mesh: str, how: dict[str, Any]
+) -> tuple[list[str], dict[str, str]]:
+    """The same from photos of boards that carry facets."""
+    from quiltcli.calibration.panels.attached import read_rig
+    from quiltcli.calibration.panels.camera import camera_of
+    from quiltcli.calibration.panels.rig import find_moved, rig_files, rig_table
+    from quiltcli.job.load import load_camera_file
+
+    idle = [name for name in ("markers", "board", "attached", "distances", "eye", "report") if how[name]]
+    if idle:
+        raise click.UsageError(f"--rig takes --camera and --anchor, not --{idle[0].rstrip('s')}")
+    camera = None if how["camera"] is None else camera_of(load_camera_file(how["camera"]))
+    boards, places = read_rig(how["rig"])
+    moved = find_moved(facets, boards, places, photos, camera, how["anchor"])
+    return list(rig_table(moved)), rig_files(spec, facets, moved, mesh)
 
 
 def _from_photos(

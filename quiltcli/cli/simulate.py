@@ -56,6 +56,13 @@ from quiltcli.cli.stereo import MATRICES
 )
 @click.option("--glasses", type=click.Choice(MATRICES), help="Both eyes' pictures as one anaglyph.")
 @click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
+@click.option("--head", is_flag=True, help="Draw the viewer's head, as --third-person sees it.")
+@click.option(
+    "--triptych",
+    is_flag=True,
+    help="Beside each other: the scene without a display, the display from the eye, the display unfolded;"
+    " --size is that of each, 640x480 by default.",
+)
 @click.option(
     "--corrected/--uncorrected",
     default=True,
@@ -78,7 +85,10 @@ from quiltcli.cli.stereo import MATRICES
 @EXPOSURE
 @THREADS
 @SETS
-def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], **how: Any) -> None:
+@click.pass_context
+def simulate(
+    context: click.Context, /, job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], **how: Any
+) -> None:
     """Light the display of JOB with its images and look at it.
 
     From the viewer's eye the picture is compared with a direct one of the scene; the figures go to
@@ -97,6 +107,9 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
         how["compare"] = any((pictures.picture, pictures.direct, pictures.heat_map))
     if how["size"] is None:
         raise click.UsageError("--size: a picture needs a width and a height")
+    _check_kinds(how)
+    if how["triptych"] and context.get_parameter_source("size") is click.core.ParameterSource.DEFAULT:
+        how["size"] = (640, 480)
     samples, threads = how.pop("supersample"), how.pop("threads") or 0
     loaded = load_job(job, sets)
     ring = {name: how.pop(name) for name in _RING}
@@ -110,6 +123,17 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
     options = PictureOptions(samples=samples, threads=threads, resampled=True, **how)
     for line in write_pictures(loaded, frames or loaded.frames[:1], options, pictures, _note):
         click.echo(line)
+
+
+def _check_kinds(how: dict[str, Any]) -> None:
+    """Refuse kinds of pictures that exclude each other."""
+    if how["head"] and not how["third_person"]:
+        raise click.UsageError("--head is what a third person sees (give --third-person too)")
+    if not how["triptych"]:
+        return
+    for name, option in (("third_person", "--third-person"), ("place", "--from"), ("look_at", "--look-at")):
+        if how[name]:
+            raise click.UsageError(f"--triptych is seen from the eye (expected no {option} beside it)")
 
 
 _RING = ("content", "tones", "slices", "photometric", "aperture", "focus")

@@ -48,7 +48,7 @@ def read_corners(path: Path, facets: Facets, units: str = "m") -> FloatArray:
     Raises:
         JobError: corners that are missing, named twice, on no facet, or no numbers.
     """
-    text = read_input(path, JobError, "a CSV file").decode("utf-8-sig", "replace")
+    text = read_input(path, JobError, "a CSV").decode("utf-8-sig", "replace")
     rows = list(csv.reader(io.StringIO(text), delimiter=";" if ";" in text.partition("\n")[0] else ","))
     if not rows or [name.strip().lower() for name in rows[0]] != list(COLUMNS):
         found = ", ".join(rows[0])[:60] if rows else "nothing"
