@@ -397,6 +397,8 @@ class JobFile(FileModel):
 
     model_config = ConfigDict(json_schema_extra=_scene_or_lightfield)
     kind: ClassVar[str] = "quilt_job"
+    copied: ClassVar[dict[str, str]] = {"scene": "lightfield"}
+    """Keys that another one's value is copied to where they are absent."""
 
     quilt_job: Annotated[int, Field(ge=1, le=1)] = 1
     """Version of the format."""

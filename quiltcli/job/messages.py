@@ -18,6 +18,12 @@ def problems_of(error: ValidationError, model: type[BaseModel], source: Source) 
     found: list[Problem] = []
     for details in error.errors(include_url=False):
         key = tuple(part for part in details["loc"] if not _is_tag(part))
+        if (
+            key
+            and key[:1] not in source.marks
+            and (getattr(model, "copied", {}).get(key[0]),) in source.marks
+        ):
+            continue  # what is wrong with the value is told where it stands
         if details["type"] == "quilt":
             ctx = details["ctx"]
             found += [source.problem(key + tuple(at), text) for at, text in ctx["found"]]

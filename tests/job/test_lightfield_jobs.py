@@ -80,6 +80,15 @@ def test_what_does_not_go_together_is_told(job: Path, old: str, new: str, expect
     assert expected in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["no.yaml", "[1]", "field.png", "3"])
+def test_a_light_field_that_is_none_is_told_once(job: Path, name: str) -> None:
+    job.write_text(JOB.replace("lightfield: field.yaml", f"lightfield: {name}"))
+    with pytest.raises(JobError) as caught:
+        load_job(job)
+    (problem,) = caught.value.problems
+    assert (problem.key, problem.line > 1) == ("lightfield", True)
+
+
 def test_mistakes_of_the_light_field_are_those_of_the_job(job: Path) -> None:
     path = job.parent / "field.yaml"
     path.write_text(path.read_text().replace("views: 3", "views: 0"))

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quiltcli.charts.meet import meet, net
+from quiltcli.charts.meet import meet
+from quiltcli.charts.rim import net_to_the_rim
 from quiltcli.charts.shapes import turned
 from quiltcli.display import Facets, triangulate
 from quiltcli.geometry import FloatArray, Int32Array, cross, dot
@@ -83,7 +84,7 @@ def skin_of(facets: Facets, viewer: Viewer) -> Skin:
     for row, chart in enumerate(facets.charts):
         if chart is None or not facets.enabled[row]:
             continue
-        points, places, cells = net(chart)
+        points, places, cells = net_to_the_rim(chart)
         if not chart.stands:
             turn = viewer.camera_from_world.T if chart.follows == "view" else np.eye(3)
             points = turned(turn, points.T).T + viewer.eye
