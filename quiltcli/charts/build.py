@@ -10,6 +10,7 @@ import numpy as np
 
 from quiltcli.charts.chart import Chart
 from quiltcli.charts.kinds import KINDS, OUTWARD, metres_by
+from quiltcli.charts.measure import seam_gap
 from quiltcli.charts.omni import MERGE_DEG, Omnistereo
 from quiltcli.charts.projections import FACES, cube_face
 from quiltcli.charts.projections import KINDS as PROJECTIONS
@@ -28,6 +29,7 @@ GRID = 33
 _FLAT = 1e-9  # of the size squared, for a unit of s and t
 _MEETS = 1e-6  # of the size
 _IMPLICIT = 1e-4  # of the size
+_CLOSES = 0.01  # pixels
 
 
 def surface_chart(spec: Any, number: int, display: DisplayFile) -> Chart:
@@ -55,7 +57,7 @@ def surface_chart(spec: Any, number: int, display: DisplayFile) -> Chart:
     side = _lit_side(spec, shape, normals, blame)
     if getattr(spec, "zero", None):
         _check_equation(spec, shape, display, blame)
-    return Chart(
+    chart = Chart(
         shape=shape,
         size=size,
         side=side,
@@ -63,6 +65,9 @@ def surface_chart(spec: Any, number: int, display: DisplayFile) -> Chart:
         wraps=_wraps(shape),
         record=record_of(spec, display),
     )
+    # A map knows its points alone: it is a ring where its last pixel is a step before its first.
+    gap = seam_gap(chart) if spec.kind == "map" else None
+    return replace(chart, wraps=True) if gap is not None and gap < _CLOSES else chart
 
 
 def placed(shape: Shape, spec: Any, display: DisplayFile) -> Placed:

@@ -39,6 +39,22 @@ def test_a_map_of_points_reads_back_as_the_same_pixels(name: str, suffix: str, t
     assert (first.normals(x, y) * second.normals(x, y)).sum(axis=0)[2:-2, 2:-2].min() > 0.99
 
 
+def test_a_map_of_a_ring_is_a_ring(tmp_path: Path) -> None:
+    for arc, closes in (("[-180, 180]", True), ("[-180, 179]", False)):
+        written(f"kind: cylinder, radius: 2, height: 1, arc_deg: {arc}", tmp_path, "map.exr")
+        text = "quilt_display: 1\nsurfaces:\n- {kind: map, file: map.exr}\n"
+        (tmp_path / "m.yaml").write_text(text)
+        (chart,) = load_display(load_display_file(tmp_path / "m.yaml")).charts
+        assert chart is not None
+        assert chart.wraps == closes
+    # Beyond an edge the other one goes on.
+    written("kind: cylinder, radius: 2, height: 1", tmp_path, "map.exr")
+    (chart,) = load_display(load_display_file(tmp_path / "m.yaml")).charts
+    y = np.full(3, 10.5)
+    beyond, other = (chart.points(np.array(x), y) for x in ([48.5, 49.5, -0.5], [0.5, 1.5, 47.5]))
+    assert np.abs(beyond - other).max() < 1e-12
+
+
 def test_a_mesh_of_a_surface_reads_back_as_a_surface(tmp_path: Path) -> None:
     written(SURFACES["cylinder"], tmp_path, "mesh.obj")
     first = load_display(load_display_file(tmp_path / "d.yaml")).charts[0]

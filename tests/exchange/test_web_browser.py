@@ -89,7 +89,12 @@ def test_from_aside_it_is_bent_as_the_simulation_says(job, tmp_path):
     ("display", "eye", "at"),
     [
         ("surfaces:\n- {kind: sphere, radius: 1, pixels: [1024, 512]}", (0.6, 0.9, 2.6), (0, 0, 0)),
-        ("projection: {kind: equirect, pixels: [1024, 512], follows: view}", (0.3, 0.2, 0.1), (2, 0.5, -3)),
+        pytest.param(
+            "projection: {kind: equirect, pixels: [1024, 512], follows: view}",
+            (0.3, 0.2, 0.1),
+            (2, 0.5, -3),
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_curved_display_is_the_picture_of_the_simulation(display, eye, at, tmp_path):
