@@ -238,6 +238,15 @@ def RectLight "lamp"
 }
 """
 USD_SCENE = "quilt_scene: 1\nobjects: [{mesh: m.usda, animation: {}}]\nlights: file\n"
+POINTS = '[[0, 0, 0], [1, 0.5, -2e-1], null, {"point": [0, 2, 0]}, [0, 0, 3]]\n'
+LIGHTS = "quilt_display: 1\npoints: {file: leds.json, size: 8 mm, columns: 3}\nunits: cm\n"
+LOG = """\
+person,task,display,optimal_length,path_length,undos,motions,seconds,overall
+ann,easy,wall,10,12,1,30,60.5,4
+ann,easy,ball,10,10,0,40,50,5
+bob,easy,wall,10,20,3,10,90,
+bob,easy,ball,10,14,1,35,70,3
+"""
 MESH_DISPLAY = "quilt_display: 1\nmesh: {mesh}\nresolution: {{pixels_per_metre: 8}}\n"
 
 
@@ -290,6 +299,9 @@ KINDS = (
     Kind("tracked", "job.yaml", "yaml", ("check job.yaml", _RENDER), {"job.yaml": TRACKED}),
     Kind("track", "track.csv", "text", ("check job.yaml", "info job.yaml", _RENDER), {"job.yaml": TRACKED}),
     Kind("display", "display.yaml", "yaml", ("check display.yaml", "info display.yaml", "pack display.yaml --method rows --size 80x80 -o l.yaml", "check l.yaml")),
+    Kind("points", "leds.json", "json", ("check display.yaml", "info display.yaml", "pack display.yaml -o l.yaml", "check l.yaml"), {"leds.json": POINTS, "display.yaml": LIGHTS}),
+    Kind("lights", "display.yaml", "yaml", ("check display.yaml", "info display.yaml", "pack display.yaml -o l.yaml"), {"leds.json": POINTS, "display.yaml": LIGHTS}),
+    Kind("study", "log.csv", "text", ("study log.csv -o r.html", "study log.csv --skip hard"), {"log.csv": LOG}),
     Kind("scene", "scene.yaml", "yaml", ("check scene.yaml", "info scene.yaml", _RENDER)),
     Kind("layout", "layout.yaml", "yaml", ("check layout.yaml", "info layout.yaml", *_EXPORTS)),
     Kind("columns", "c.npz", "bytes", ("check c.yaml", "info c.yaml")),
