@@ -72,6 +72,7 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/channels.py out/demo/facets/facet_0001.0003.exr -o $(DOCS)/channels.png
 	$(PY) docs/pictures/motion_blur.py -o $(DOCS)/motion-blur.png
 	$(PY) docs/pictures/transparency.py -o $(DOCS)/transparency.png
+	$(PY) docs/pictures/usd.py -o $(DOCS)/usd.png && $(PY) docs/pictures/reduce.py $(DOCS)/usd.png
 	$(PY) docs/pictures/calibrate.py $(DOCS)/calibrate-residuals.png
 	$(QUILT) simulate scenes/demo.yaml -f 4 -o $(DOCS)/triptych.png --triptych --size 480x380 --supersample 3
 	$(PY) docs/pictures/brightness.py -o $(DOCS)/brightness.png
@@ -135,7 +136,7 @@ packing-table: env ## pack every display by every method and write the tables of
 
 surfaces: env ## measure curved displays, and put tables and pictures into docs/surfaces.md
 	$(PY) -m tests.benchmarks.surfaces --docs
-	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png $(DOCS)/surfaces-two-eyes.png
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
 	$(PY) -m pytest tests/system/test_golden.py tests/system/test_golden_turn.py --update-golden

@@ -7,7 +7,19 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, EYE, PAIR, PATH, POINT, SETS, SIZE, THREADS, VIEW, frames_option
+from quiltcli.cli.options import (
+    EXPOSURE,
+    EYE,
+    PAIR,
+    PATH,
+    POINT,
+    SETS,
+    SIZE,
+    THREADS,
+    VIEW,
+    frames_option,
+    refuse_typed,
+)
 from quiltcli.cli.stereo import MATRICES
 
 
@@ -100,14 +112,12 @@ def simulate(
         how["size"] = (640, 480)
     samples, threads = how.pop("supersample"), how.pop("threads") or 0
     loaded = load_job(job, sets)
-    ring = {
-        name: how.pop(name) for name in ("content", "tones", "slices", "photometric", "aperture", "focus")
-    }
+    ring = {name: how.pop(name) for name in _RING}
     if loaded.ring is not None:
+        refuse_typed("on a ring of viewers", but=(*_RING, *_ANYWHERE))
         _around(loaded, frames or loaded.frames[:1], pictures, {**ring, **how})
         return
-    if ring != _RING:
-        raise click.UsageError("--content, --tones, --slices, --aperture, --focus are for rings of viewers")
+    refuse_typed("without a ring of viewers", _RING)
     if isinstance(how["eye"], tuple):
         raise click.UsageError("--eye: expected left or right, for the viewers of this job are no ring")
     options = PictureOptions(samples=samples, threads=threads, resampled=True, **how)
@@ -126,14 +136,11 @@ def _check_kinds(how: dict[str, Any]) -> None:
             raise click.UsageError(f"--triptych is seen from the eye (expected no {option} beside it)")
 
 
-_RING = {
-    "content": "mcop",
-    "tones": False,
-    "slices": False,
-    "photometric": False,
-    "aperture": None,
-    "focus": None,
-}
+_RING = ("content", "tones", "slices", "photometric", "aperture", "focus")
+_ANYWHERE = (
+    *("job", "frames", "output", "size", "eye", "direct", "heat_map", "view", "exposure", "threads", "sets"),
+    "video",
+)
 
 
 def _around(job: Any, frames: Any, pictures: Any, how: dict[str, Any]) -> None:
@@ -146,8 +153,7 @@ def _around(job: Any, frames: Any, pictures: Any, how: dict[str, Any]) -> None:
     eye = how["eye"] or None
     if isinstance(eye, str):
         raise click.UsageError("--eye: expected AZIMUTH,HEIGHT,DISTANCE on a ring of viewers")
-    names = ("content", "tones", "slices", "photometric", "aperture", "focus", "size")
-    options = EyeOptions(eye=eye, **{name: how[name] for name in names})
+    options = EyeOptions(eye=eye, **{name: how[name] for name in (*_RING, "size")})
     for line in write_eye_pictures(job, frames, options, pictures):
         click.echo(line)
 

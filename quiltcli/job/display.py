@@ -340,6 +340,9 @@ class DisplayFile(FileModel):
                 yield (name,), "cannot stand beside points (points are the whole display, a pixel each)"
         if self.facets:
             yield ("facets",), "cannot stand beside points (points are the whole display, a pixel each)"
+        if self.corrections is not None and self.corrections.brightness is not None:
+            words = "belongs to panels, which darken aslant (points have no side that they face)"
+            yield ("corrections", "brightness"), words
         if self.viewing_side == "back":
             yield (
                 ("viewing_side",),

@@ -18,6 +18,8 @@ from quiltcli.analysis.simulate.lookup import Shown
 from quiltcli.analysis.simulate.overlaps import all_light
 from quiltcli.analysis.simulate.picture import (
     direct_light,
+    displayed_light,
+    exact_images,
     first_triangles,
     outlined,
     seen_from,
@@ -219,7 +221,10 @@ def take_picture(
     on_lit = np.where(lit, facet, -1).reshape(height, width).astype(np.int32)
     covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
     coarse = None
-    if options.resampled and not stage.facets.charts:
+    if options.resampled and stage.facets.charts:
+        again = replace(shown, buffers=exact_images(stage, viewer, threads))
+        coarse, _ = displayed_light(again, camera, through, facet, options.filter, skin, triangle)
+    elif options.resampled:
         coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads, options.filter)
     once = None if coarse is None else block_means(_image(level * coarse, width), options.samples)
     comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples), once)
