@@ -1,8 +1,8 @@
 """How pictures of projectors overlap: what share of the light each pixel gives, and how black is lifted.
 
-At a point of the screen each projector that lights it counts by how far the pixel is from the border of its
-picture; shares are those counts over their sum. So they add up to 1 wherever a point is lit, go to 0 at the
-border of every picture, and have no steps. They are shares of light, not of signals.
+At a point of the screen each projector that lights it counts by the square of how far the pixel is from the
+border of its picture; shares are those counts over their sum. So they add up to 1 wherever a point is lit, go
+to 0 at the border of every picture, level there, and have no steps. They are shares of light, not of signals.
 """
 
 from __future__ import annotations
@@ -94,13 +94,15 @@ def _centres(chart: Chart) -> Centres:
 
 
 def _counts(chart: Chart, width: float | None) -> FloatArray:
-    """How much each pixel (H, W) of a picture counts: its distance to the border, up to 1; 0 outside."""
+    """How much each pixel (H, W) of a picture counts: its distance to the border squared, up to 1."""
     wide, high = chart.size
     there = np.ones((high, wide), dtype=np.bool_) if chart.mask is None else chart.mask
     # From centre to centre of the nearest pixel that is not there: the border is half a pixel nearer.
     away = ndimage.distance_transform_edt(np.pad(there, 1))[1:-1, 1:-1] - 0.5
     reach = width if width is not None else float(away.max())
-    return np.asarray(np.where(there, np.minimum(away / reach, 1.0), 0.0))
+    share = np.where(there, np.minimum(away / reach, 1.0), 0.0)
+    # Squares end level at the border: no edge is seen where a picture begins to fade.
+    return np.asarray(share * share)
 
 
 Finder = Callable[[FloatArray], tuple[FloatArray, FloatArray]]

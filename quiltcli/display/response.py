@@ -27,7 +27,7 @@ from quiltcli.job.dump import plain
 _PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))
 _WHITE = (0.3127, 0.3290)
 _EDGE_ON = 1e-9
-_LEAST_SHARE = 0.02
+_LEAST_SHARE = 0.001
 Place: TypeAlias = tuple[FloatArray, FloatArray]
 
 

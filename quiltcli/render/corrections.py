@@ -64,25 +64,23 @@ class Headroom:
             max(self.brightened, other.brightened),
         )
 
-    def as_json(self) -> dict[str, Any]:
-        """As `report.json` holds it."""
-        return asdict(self)
+    def as_json(self, response: Response) -> dict[str, Any]:
+        """As `report.json` holds it, with the level at which nothing would be over, where there is light."""
+        fits = _rounded_down(response.level / self.brightest) if self.brightest > 0 else None
+        return {**asdict(self), "fits": fits}
 
     def words(self, response: Response) -> Iterator[str]:
-        """What a user should know of it."""
+        """What a user should know of it: the same words for every frame, the figures stand beside them."""
         if self.over:
-            share = 100 * self.over / self.pixels
-            fits = _rounded_down(response.level / self.brightest)
-            what = "written all the same" if not response.clip else "written as bright as they can be"
+            what = "are as bright as they can be" if response.clip else "are written all the same"
             yield (
-                f"corrections: {share:.2g} % of the pixels want up to {self.brightest:.3g} times the light"
-                f" that the panels can give, and are {what} (corrections.level: {fits:g} leaves room for all)"
+                f"corrections: some pixels want more light than the panels can give, and {what}"
+                " (corrections.level makes room)"
             )
         if self.limited:
-            share = 100 * self.limited / self.pixels
             yield (
-                f"corrections: {share:.2g} % of the pixels are seen so aslant that brightening them"
-                f" {response.limit:g} times is not enough (corrections.brightness.limit); they look darker"
+                f"corrections: some pixels are seen so aslant that brightening them {response.limit:g} times"
+                " is not enough (corrections.brightness.limit); they look darker"
             )
 
 

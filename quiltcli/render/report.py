@@ -228,7 +228,22 @@ def summary(records: Sequence[FrameRecord]) -> list[tuple[str, str]]:
     lines.append(("lit facets", _range_text([record.lit_facets for record in records], "{:,}")))
     lines.append(("pixels that show it", _range_text([record.visible_pixels for record in records], "{:,}")))
     lines.append(("fill", _range_text([100 * record.fill for record in records], "{:.1f} %")))
+    lines += _headroom([record.corrections for record in records if record.corrections])
     return lines
+
+
+def _headroom(found: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """What corrections asked of the panels, in two lines; nothing where nothing was corrected."""
+    shares = [100 * one["over"] / one["pixels"] for one in found if one["pixels"]]
+    if not shares:
+        return []
+    most = max(one["brightest"] for one in found)
+    fits = min(one["fits"] for one in found if one["fits"] is not None)
+    lines = [
+        ("light wanted", f"up to {most:.3g} times what the panels can give (room for it: level {fits:g})"),
+        ("pixels beyond that", _range_text(shares, "{:.2f} %")),
+    ]
+    return lines[:1] if most <= 1 else lines
 
 
 def summary_warnings(records: Sequence[FrameRecord]) -> list[str]:

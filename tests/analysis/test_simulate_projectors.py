@@ -104,9 +104,10 @@ def sphere_job(folder, pixels):
 
 def test_a_projected_sphere_is_the_direct_picture_resampled_once(tmp_path):
     job = sphere_job(tmp_path, "[400, 320]")
-    found = seen(job)
+    found = seen(job, resampled=True)
     assert found.comparison is not None
     assert found.comparison.share > 0.3
+    assert found.comparison.mean / found.comparison.resampled == pytest.approx(1, abs=1e-3)
     # The same by hand: rays meet the sphere, the projector's matrix says at which pixel, and the image that
     # verify holds against rays is looked up there, in proportion between pixels.
     stage = set_stage(job)

@@ -12,6 +12,7 @@ from quiltcli.images.diff import diff
 from quiltcli.job import job_sha256, load_job
 from quiltcli.render.corrections import cosines
 from quiltcli.render.notices import stage_warnings
+from quiltcli.render.report import summary, summary_warnings
 from quiltcli.render.sequence import RenderOptions, render
 from quiltcli.render.setup import set_stage
 from tests.helpers.even_light import COLOR, CYLINDER, WALLS, even_job
@@ -87,7 +88,7 @@ def test_nothing_is_brighter_than_a_panel_can_be_unless_told(tmp_path):
     assert record.corrections is not None
     assert record.corrections["over"] > 0
     assert record.corrections["brightest"] > 1
-    assert any("times the light that the panels can give" in words for words in record.warnings)
+    assert any("want more light than the panels can give" in words for words in record.warnings)
     told = even_job(tmp_path, WALLS + FALL + "  clip: false\n")
     rendered(told, tmp_path / "told")
     wanted = record.corrections["brightest"]
@@ -98,19 +99,32 @@ def test_nothing_is_brighter_than_a_panel_can_be_unless_told(tmp_path):
 
 def test_the_level_that_is_said_to_leave_room_does(tmp_path):
     job = even_job(tmp_path, WALLS + FALL)
-    words = next(w for w in rendered(job, tmp_path / "out")[0].warnings if "leaves room for all" in w)
-    level = float(words.split("corrections.level: ")[1].split()[0])
+    found = rendered(job, tmp_path / "out")
+    assert found[0].corrections is not None
+    level = found[0].corrections["fits"]
+    lines = dict(summary(found))
+    assert lines["light wanted"].endswith(f"(room for it: level {level:g})")
+    assert "%" in lines["pixels beyond that"]
     record = rendered(even_job(tmp_path, WALLS + FALL + f"  level: {level}\n"), tmp_path / "room")[0]
     assert record.corrections is not None
     assert record.corrections["over"] == 0
     assert record.corrections["brightest"] > 0.9
+    assert not record.warnings
+    assert "pixels beyond that" not in dict(summary([record]))
+
+
+def test_warnings_are_the_same_words_for_every_frame(tmp_path):
+    records = render(even_job(tmp_path, WALLS + FALL), RenderOptions(folder=tmp_path / "out", threads=1))
+    assert len(records) == 2
+    assert records[0].warnings == records[1].warnings
+    assert len(summary_warnings(records)) == len(records[0].warnings)
 
 
 def test_reports_and_images_tell_of_corrections_and_the_job_can_do_without(tmp_path):
     job = even_job(tmp_path, WALLS + FALL)
     rendered(job, tmp_path / "with")
     record = json.loads((tmp_path / "with/report.json").read_text())["frames"][0]
-    assert set(record["corrections"]) == {"pixels", "over", "limited", "brightest", "brightened"}
+    assert set(record["corrections"]) == {"pixels", "over", "limited", "brightest", "brightened", "fits"}
     assert json.loads(image(tmp_path / "with").attributes["quilt:corrections"])["brightness"]["exponent"] == 1
     without = load_job(tmp_path / "job.yaml", ["render.corrections=false"])
     rendered(without, tmp_path / "without")

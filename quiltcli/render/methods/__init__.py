@@ -125,7 +125,7 @@ def corrected(
         record,
         seconds={**record.seconds, **clock.seconds},
         warnings=(*record.warnings, *headroom.words(response)),
-        corrections=headroom.as_json(),
+        corrections=headroom.as_json(response),
     )
 
 
