@@ -8,6 +8,7 @@ from quiltcli.formats.gltf.json_values import Json
 from quiltcli.formats.gltf.model import Material, TextureUse
 
 UNLIT = "KHR_materials_unlit"
+SPECULAR = "KHR_materials_specular"
 STRENGTH = "KHR_materials_emissive_strength"
 TRANSFORM = "KHR_texture_transform"
 WEBP = "EXT_texture_webp"
@@ -49,6 +50,7 @@ def read_material(json: Json, entry: Json) -> Material:
         double_sided=entry["doubleSided"].flag(),
         textures={name: _texture(json, use, key) for name, (use, key) in slots.items() if use},
         path=entry.path,
+        specular=min(entry.extension(SPECULAR)["specularFactor"].number(1.0, low=0), 1.0),
     )
 
 

@@ -140,6 +140,7 @@ class Material:
         double_sided: whether its back is seen.
         textures: by slot: `color`, `metallic_roughness`, `normal`, `occlusion`, `emission`.
         path: where it stands in the file.
+        specular: 0 to 1, strength of the layer that reflects; metals reflect all the same.
     """
 
     name: str = ""
@@ -153,6 +154,7 @@ class Material:
     double_sided: bool = False
     textures: dict[str, TextureUse] = field(default_factory=dict, hash=False)
     path: str = ""
+    specular: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from quiltcli.formats.gltf.container import Container, read_container
 from quiltcli.formats.gltf.images import Images
 from quiltcli.formats.gltf.json_values import Json
 from quiltcli.formats.gltf.lights import LIGHTS, read_lights
-from quiltcli.formats.gltf.materials import BASISU, STRENGTH, TRANSFORM, UNLIT, WEBP, read_material
+from quiltcli.formats.gltf.materials import BASISU, SPECULAR, STRENGTH, TRANSFORM, UNLIT, WEBP, read_material
 from quiltcli.formats.gltf.model import Gltf, Material, Primitive, Shape, Skin
 from quiltcli.formats.gltf.nodes import INSTANCING, instances, read_nodes
 from quiltcli.formats.gltf.primitives import TRIANGLES, mode_of, read_primitive, triangle_count
@@ -26,7 +26,7 @@ MOST_PIECES = 2**20
 _QUANTIZATION = "KHR_mesh_quantization"
 READ = (
     *(DRACO, MESHOPT, INSTANCING, _QUANTIZATION, LIGHTS),
-    *(UNLIT, STRENGTH, TRANSFORM, WEBP),
+    *(UNLIT, STRENGTH, SPECULAR, TRANSFORM, WEBP),
 )
 # These are spoken of where they stand, or say nothing that is to be seen.
 _SPOKEN_OF = ("KHR_animation_pointer", "KHR_xmp_json_ld", "KHR_xmp")
@@ -193,10 +193,22 @@ class _Reader:
         for name, users in self._material_extensions().items():
             said.add(name)
             yield f"{name[:60]} is not drawn ({_listed(users)})"
+        if users := self._colored_layers():
+            yield f"{SPECULAR} is drawn by its specularFactor alone ({_listed(users)})"
         for item in self.json["extensionsUsed"].items():
             if item.text() not in said:
                 said.add(item.text())
                 yield f"the extension {item.text()[:60]} is not read"
+
+    def _colored_layers(self) -> list[str]:
+        """Names of shown materials whose layer has a colour or pictures."""
+        found = []
+        for index, material in sorted(self.materials.items()):
+            if index >= 0:
+                layer = self.json["materials"].at(index).extension(SPECULAR)
+                if layer and set(layer.names()) - {"specularFactor", "extras", "extensions"}:
+                    found.append(_name(material, index))
+        return found
 
     def _material_extensions(self) -> dict[str, list[str]]:
         """Extensions of shown materials that are not read, with the materials' names."""

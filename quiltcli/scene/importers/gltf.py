@@ -231,6 +231,7 @@ def surface_of(material: Material, gltf: Gltf | None = None) -> Surface:
         roughness=material.roughness,
         emission=(0.0, 0.0, 0.0) if material.unlit else material.emission,
         unlit=material.unlit,
+        specular=material.specular,
         opacity=material.color[3],
         alpha=material.alpha_mode.lower(),
         cutoff=material.cutoff,

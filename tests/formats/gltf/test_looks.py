@@ -131,6 +131,30 @@ def test_looks_that_are_not_drawn_are_told_with_the_material(tmp_path):
     assert found.notices == ("KHR_materials_transmission is not drawn ('glass')",)
 
 
+@pytest.mark.parametrize(
+    ("given", "strength", "told"),
+    [
+        ({}, 1.0, ()),
+        ({"specularFactor": 0.3}, 0.3, ()),
+        ({"specularFactor": 2.5}, 1.0, ()),
+        (
+            {"specularFactor": 0, "specularColorFactor": [1, 0, 0]},
+            0.0,
+            ("KHR_materials_specular is drawn by its specularFactor alone ('paint')",),
+        ),
+    ],
+)
+def test_the_layer_is_as_strong_as_its_extension_says(tmp_path, given, strength, told):
+    found = material(tmp_path, name="paint", extensions={"KHR_materials_specular": given})
+    assert surface_of(found.materials[0]).specular == strength
+    assert found.notices == told
+
+
+def test_a_strength_below_0_is_an_error(tmp_path):
+    with pytest.raises(MeshError, match="specularFactor: expected a number from 0, got -1"):
+        material(tmp_path, extensions={"KHR_materials_specular": {"specularFactor": -1}})
+
+
 def textured(path, **image):
     """A file whose only picture is `image`; with its bytes given as `data`."""
     file = GltfFile()
