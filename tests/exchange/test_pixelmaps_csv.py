@@ -169,7 +169,7 @@ def test_json_is_the_layout_file_in_other_words(tmp_path):
             [
                 "9:5: facets[0].du: missing key (world step to the next pixel right, metres)",
                 "9:200: facets[0].dw: unknown key (known: id, page, size, quilt_from_facet, origin, du, dv,"
-                " polygon)",
+                " polygon, surface)",
             ],
         ),
         ("[64, 24]", "[64]", ["7:22: pages[0].size: expected 2 whole numbers, width and height, got 1"]),

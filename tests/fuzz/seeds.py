@@ -246,6 +246,8 @@ ann,easy,wall,10,12,1,30,60.5,4
 ann,easy,ball,10,10,0,40,50,5
 bob,easy,wall,10,20,3,10,90,
 bob,easy,ball,10,14,1,35,70,3
+ann,hard,wall,14,20,2,60,90,3
+ann,hard,ball,14,15,1,50,70,4
 """
 MESH_DISPLAY = "quilt_display: 1\nmesh: {mesh}\nresolution: {{pixels_per_metre: 8}}\n"
 
