@@ -72,7 +72,9 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/channels.py out/demo/facets/facet_0001.0003.exr -o $(DOCS)/channels.png
 	$(PY) docs/pictures/motion_blur.py -o $(DOCS)/motion-blur.png
 	$(PY) docs/pictures/transparency.py -o $(DOCS)/transparency.png
+	$(PY) docs/pictures/usd.py -o $(DOCS)/usd.png && $(PY) docs/pictures/reduce.py $(DOCS)/usd.png
 	$(PY) docs/pictures/calibrate.py $(DOCS)/calibrate-residuals.png
+	$(QUILT) simulate scenes/demo.yaml -f 4 -o $(DOCS)/triptych.png --triptych --size 480x380 --supersample 3
 	$(PY) docs/pictures/brightness.py -o $(DOCS)/brightness.png
 	$(PY) docs/pictures/projectors.py -o $(DOCS)/projectors.png
 	$(QUILT) simulate scenes/study/sphere.yaml -f 9 -o $(DOCS)/study-sphere.png --size 600x480 --supersample 3
@@ -81,7 +83,7 @@ pictures: env ## make the pictures of the README anew
 	$(PY) docs/pictures/points.py out/points
 	$(QUILT) simulate out/points/job.yaml -f 1 -o $(DOCS)/points.png --size 720x600 --supersample 3
 	$(PY) docs/pictures/study.py tests/analysis/ease/made_up_log.csv $(DOCS)/study-persons.svg
-	$(PY) docs/pictures/reduce.py $(DOCS)/brightness.png $(DOCS)/projectors.png $(DOCS)/calibrate-residuals.png $(DOCS)/study-cubes.png $(DOCS)/points.png $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png $(DOCS)/show_*.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/brightness.png $(DOCS)/projectors.png $(DOCS)/triptych.png $(DOCS)/calibrate-residuals.png $(DOCS)/study-cubes.png $(DOCS)/points.png $(DOCS)/channels.png $(DOCS)/motion-blur.png $(DOCS)/transparency.png $(DOCS)/lightfield.png $(DOCS)/box_*.png $(DOCS)/sphere_*.png $(DOCS)/textures.png $(DOCS)/take.png $(DOCS)/cave-take.png $(DOCS)/stereo-*.png $(DOCS)/show_*.png
 
 mirror-pictures: env ## make the pictures of docs/lightfield360.md anew
 	$(QUILT) render scenes/demo_mirror.yaml --positions 25-48 --overwrite --set output.tones=true
@@ -134,7 +136,7 @@ packing-table: env ## pack every display by every method and write the tables of
 
 surfaces: env ## measure curved displays, and put tables and pictures into docs/surfaces.md
 	$(PY) -m tests.benchmarks.surfaces --docs
-	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png
+	$(PY) docs/pictures/reduce.py $(DOCS)/surfaces.png $(DOCS)/surfaces-two-eyes.png
 
 golden: env ## make the golden pictures anew; look at the differences before committing them
 	$(PY) -m pytest tests/system/test_golden.py tests/system/test_golden_turn.py --update-golden

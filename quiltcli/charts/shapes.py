@@ -110,9 +110,10 @@ class Placed:
     def at(self, s: FloatArray, t: FloatArray) -> FloatArray:
         """See `Shape.at`."""
         local = self.shape.at(1.0 - s if self.reversed else s, t)
-        if self._upright:
-            return np.asarray(local + self.shift.reshape(3, *[1] * (local.ndim - 1)))
-        return turned(self.linear, local, self.shift)
+        with np.errstate(all="ignore"):  # formulas may give anything; what is not finite is told by who asks
+            if self._upright:
+                return np.asarray(local + self.shift.reshape(3, *[1] * (local.ndim - 1)))
+            return turned(self.linear, local, self.shift)
 
     def normal(self, s: FloatArray, t: FloatArray) -> FloatArray:
         """See `Shape.normal`."""
@@ -120,7 +121,8 @@ class Placed:
         # Normals go with the cofactors of the map of points; the cross product takes its determinant's sign.
         a, b, c = self.linear.T
         cofactors = np.stack((np.cross(b, c), np.cross(c, a), np.cross(a, b)), axis=1)
-        return turned(-cofactors if self.reversed else cofactors, local)
+        with np.errstate(all="ignore"):
+            return turned(-cofactors if self.reversed else cofactors, local)
 
 
 def turned(linear: FloatArray, points: FloatArray, shift: FloatArray | None = None) -> FloatArray:

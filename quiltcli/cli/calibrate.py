@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import OVERWRITE, PATH, POINT
+from quiltcli.cli.options import OVERWRITE, PATH, POINT, refuse_typed
 
 
 @click.command()
@@ -27,6 +27,7 @@ from quiltcli.cli.options import OVERWRITE, PATH, POINT
     metavar="3x2,40mm,10mm,4x4,20=1-3",
     help="Board of markers fixed to facets: across x down, side, gap, dictionary, first id, facets.",
 )
+@click.option("--rig", type=PATH, help="The rig.json of an earlier report: photos show its boards alone.")
 @click.option(
     "--distance", "distances", multiple=True, metavar="1A-3C=1.532m", help="Measured between two corners."
 )
@@ -34,7 +35,11 @@ from quiltcli.cli.options import OVERWRITE, PATH, POINT
 @click.option("--units", default="m", show_default=True, help="Unit of measured corners: m, cm, mm, in, ft.")
 @click.option("--report", type=PATH, help="Folder for residuals, pictures and the camera.")
 @click.option(
-    "--tolerance", type=float, default=1.0, show_default=True, help="Clicks: pixels, rms, they may be off."
+    "--tolerance",
+    type=click.FloatRange(min=0),
+    default=1.0,
+    show_default=True,
+    help="Clicks: pixels, rms, they may be off.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Clicks: everything, for programs.")
 @OVERWRITE
@@ -53,6 +58,7 @@ def calibrate(inputs: tuple[Path, ...], display: Path | None, output: Path | Non
     if clicks and (len(inputs) > 1 or display is not None):
         raise click.UsageError("expected one file of clicks, without --display, or photos, or a table")
     if clicks:
+        refuse_typed("beside clicks", but=("inputs", "output", "tolerance", "as_json", "overwrite"))
         _by_clicks(clicks[0], output, **{name: how[name] for name in ("tolerance", "as_json", "overwrite")})
     elif display is None or output is None:
         raise click.UsageError("expected --display and -o beside photos or a table of corners")
@@ -94,11 +100,13 @@ def _by_panels(inputs: tuple[Path, ...], display: Path, output: Path, how: dict[
     tables = [path for path in inputs if path.suffix.lower() == ".csv"]
     if tables and len(inputs) > 1:
         raise click.UsageError("expected photos, or one table of corners, not both")
-    lines, texts = (
-        _from_corners(spec, facets, tables[0], mesh, how)
-        if tables
-        else (_from_photos(spec, facets, inputs, mesh, how))
-    )
+    if tables:
+        refuse_typed("beside a table of corners", but=("inputs", "display", "output", "units", "overwrite"))
+        lines, texts = _from_corners(spec, facets, tables[0], mesh, how)
+    else:
+        refuse_typed("beside photos", ("units", "tolerance", "as_json"))
+        from_these = _from_photos if how["rig"] is None else _from_rig
+        lines, texts = from_these(spec, facets, inputs, mesh, how)
     paths = [output.with_name(name) if name else output for name in texts]
     taken = [
         Problem("exists already (--overwrite replaces it)", file=str(path)) for path in paths if path.exists()
@@ -116,13 +124,42 @@ def _from_corners(
     spec: Any, facets: Any, path: Path, mesh: str, how: dict[str, Any]
 ) -> tuple[list[str], dict[str, str]]:
     """What to say, and the files' texts."""
-    from quiltcli.calibration.panels.corners import corner_table, fit_corners, read_corners
+    from quiltcli.calibration.panels.corners import (
+        corner_table,
+        doubtful_corners,
+        fit_corners,
+        read_corners,
+        turned_facets,
+    )
+    from quiltcli.errors import JobError, raise_all
     from quiltcli.job import UNITS
 
     if how["units"] not in UNITS:
         raise click.UsageError(f"--units: expected {', '.join(UNITS)}, got {how['units']}")
-    found = fit_corners(spec, facets, read_corners(path, facets, how["units"]), mesh)
+    corners = read_corners(path, facets, how["units"])
+    raise_all(JobError, list(doubtful_corners(path, facets, corners, how["units"]))[:20])
+    for notice in turned_facets(facets, corners):
+        click.echo(f"note: {notice}", err=True)
+    found = fit_corners(spec, facets, corners, mesh)
     return list(corner_table(facets, found.residual)), found.files
+
+
+def _from_rig(
+    spec: Any, facets: Any, photos: tuple[Path, ...], mesh: str, how: dict[str, Any]
+) -> tuple[list[str], dict[str, str]]:
+    """The same from photos of boards that carry facets."""
+    from quiltcli.calibration.panels.attached import read_rig
+    from quiltcli.calibration.panels.camera import camera_of
+    from quiltcli.calibration.panels.rig import find_moved, rig_files, rig_table
+    from quiltcli.job.load import load_camera_file
+
+    idle = [name for name in ("markers", "board", "attached", "distances", "eye", "report") if how[name]]
+    if idle:
+        raise click.UsageError(f"--rig takes --camera and --anchor, not --{idle[0].rstrip('s')}")
+    camera = None if how["camera"] is None else camera_of(load_camera_file(how["camera"]))
+    boards, places = read_rig(how["rig"])
+    moved = find_moved(facets, boards, places, photos, camera, how["anchor"])
+    return list(rig_table(moved)), rig_files(spec, facets, moved, mesh)
 
 
 def _from_photos(

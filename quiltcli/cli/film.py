@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, OVERWRITE, PATH, SIZE, frames_option
+from quiltcli.cli.options import EXPOSURE, OVERWRITE, PATH, SIZE, frames_option, refuse_typed
 
 _CODECS = ("prores", "h264", "h265", "dnxhr", "hap", "dxv", "png", "tiff", "dpx")
 
@@ -51,6 +51,10 @@ def film(
     from quiltcli.exchange.film.film import FilmOptions, make_film
     from quiltcli.images.grade import Grade
 
+    if how["subject"] != "simulation":
+        refuse_typed("without --of simulation", ("size",))
+    if how["codec"] not in ("png", "tiff"):
+        refuse_typed("without --codec png or tiff", ("bits",))
     given = {"view": view, "display": display, "config": config}
     grade = Grade(exposure=exposure, **{name: value for name, value in given.items() if value is not None})
     options = FilmOptions(grade=grade, bits=int(bits), size=size or (1920, 1080), **how)

@@ -7,11 +7,34 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from quiltcli.errors import JobError
 
 PATH = click.Path(path_type=Path)
+
+
+def refuse_typed(why: str, names: Iterable[str] = (), *, but: Iterable[str] | None = None) -> None:
+    """Refuse options of the running command that were typed and would do nothing.
+
+    Args:
+        why: when they mean nothing, such as `on a ring of viewers`.
+        names: the parameters that do nothing.
+        but: instead of `names`, the only ones that do something.
+
+    Raises:
+        click.UsageError: some were typed.
+    """
+    context = click.get_current_context()
+    idle = set(names) if but is None else {str(param.name) for param in context.command.params} - set(but)
+    typed = [
+        max(param.opts, key=len)
+        for param in context.command.params
+        if param.name in idle and context.get_parameter_source(param.name) is ParameterSource.COMMANDLINE
+    ]
+    if typed:
+        raise click.UsageError(f"{', '.join(typed)}: {'mean' if len(typed) > 1 else 'means'} nothing {why}")
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg] # generic only in some versions of click

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from quiltcli.cli.options import OVERWRITE, PATH, PATTERN, SIZE
+from quiltcli.cli.options import OVERWRITE, PATH, PATTERN, SIZE, refuse_typed
 
 
 @click.command()
@@ -58,6 +58,7 @@ def pattern(
     from quiltcli.layout import align, read_layout
 
     if is_mirror_file(layout):
+        refuse_typed("in patterns of a mirror", but=("layout", "output", "kinds", "overwrite"))
         from quiltcli.calibration.ring_pattern import KINDS as ON_MIRROR
         from quiltcli.calibration.ring_pattern import write_ring_patterns
         from quiltcli.cli.printing import print_files

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import COLORSPACE, OVERWRITE, PATH, SETS, THREADS, frames_option
+from quiltcli.cli.options import COLORSPACE, OVERWRITE, PATH, SETS, THREADS, frames_option, refuse_typed
 
 
 @click.command()
@@ -62,6 +62,10 @@ def project(
     from quiltcli.exchange.project.project import project as put_on_facets
     from quiltcli.job import load_job
 
+    if master["kind"] != "fisheye":
+        refuse_typed(f"with --as {master['kind']}", ("aperture", "tilt"))
+    if master["kind"] == "pinhole":
+        refuse_typed("with --as pinhole, which looks as the job's viewer does, or its camera", ("yaw",))
     loaded, picture = load_job(job, sets), Master(stereo=stereo or "", **master)
     options = MadeOptions(output, frames, overwrite, threads or 0)
     records = watched(lambda listener: put_on_facets(loaded, picture, options, listener, st_map=st_map))

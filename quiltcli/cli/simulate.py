@@ -7,7 +7,19 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, EYE, PAIR, PATH, POINT, SETS, SIZE, THREADS, VIEW, frames_option
+from quiltcli.cli.options import (
+    EXPOSURE,
+    EYE,
+    PAIR,
+    PATH,
+    POINT,
+    SETS,
+    SIZE,
+    THREADS,
+    VIEW,
+    frames_option,
+    refuse_typed,
+)
 from quiltcli.cli.stereo import MATRICES
 
 
@@ -44,6 +56,13 @@ from quiltcli.cli.stereo import MATRICES
 )
 @click.option("--glasses", type=click.Choice(MATRICES), help="Both eyes' pictures as one anaglyph.")
 @click.option("--edges", is_flag=True, help="Draw a line along the edges of the facets.")
+@click.option("--head", is_flag=True, help="Draw the viewer's head, as --third-person sees it.")
+@click.option(
+    "--triptych",
+    is_flag=True,
+    help="Beside each other: the scene without a display, the display from the eye, the display unfolded;"
+    " --size is that of each, 640x480 by default.",
+)
 @click.option(
     "--corrected/--uncorrected",
     default=True,
@@ -66,7 +85,10 @@ from quiltcli.cli.stereo import MATRICES
 @EXPOSURE
 @THREADS
 @SETS
-def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], **how: Any) -> None:
+@click.pass_context
+def simulate(
+    context: click.Context, /, job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], **how: Any
+) -> None:
     """Light the display of JOB with its images and look at it.
 
     From the viewer's eye the picture is compared with a direct one of the scene; the figures go to
@@ -85,16 +107,17 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
         how["compare"] = any((pictures.picture, pictures.direct, pictures.heat_map))
     if how["size"] is None:
         raise click.UsageError("--size: a picture needs a width and a height")
+    _check_kinds(how)
+    if how["triptych"] and context.get_parameter_source("size") is click.core.ParameterSource.DEFAULT:
+        how["size"] = (640, 480)
     samples, threads = how.pop("supersample"), how.pop("threads") or 0
     loaded = load_job(job, sets)
-    ring = {
-        name: how.pop(name) for name in ("content", "tones", "slices", "photometric", "aperture", "focus")
-    }
+    ring = {name: how.pop(name) for name in _RING}
     if loaded.ring is not None:
+        refuse_typed("on a ring of viewers", but=(*_RING, *_ANYWHERE))
         _around(loaded, frames or loaded.frames[:1], pictures, {**ring, **how})
         return
-    if ring != _RING:
-        raise click.UsageError("--content, --tones, --slices, --aperture, --focus are for rings of viewers")
+    refuse_typed("without a ring of viewers", _RING)
     if isinstance(how["eye"], tuple):
         raise click.UsageError("--eye: expected left or right, for the viewers of this job are no ring")
     options = PictureOptions(samples=samples, threads=threads, resampled=True, **how)
@@ -102,14 +125,22 @@ def simulate(job: Path, frames: tuple[int, ...] | None, sets: tuple[str, ...], *
         click.echo(line)
 
 
-_RING = {
-    "content": "mcop",
-    "tones": False,
-    "slices": False,
-    "photometric": False,
-    "aperture": None,
-    "focus": None,
-}
+def _check_kinds(how: dict[str, Any]) -> None:
+    """Refuse kinds of pictures that exclude each other."""
+    if how["head"] and not how["third_person"]:
+        raise click.UsageError("--head is what a third person sees (give --third-person too)")
+    if not how["triptych"]:
+        return
+    for name, option in (("third_person", "--third-person"), ("place", "--from"), ("look_at", "--look-at")):
+        if how[name]:
+            raise click.UsageError(f"--triptych is seen from the eye (expected no {option} beside it)")
+
+
+_RING = ("content", "tones", "slices", "photometric", "aperture", "focus")
+_ANYWHERE = (
+    *("job", "frames", "output", "size", "eye", "direct", "heat_map", "view", "exposure", "threads", "sets"),
+    "video",
+)
 
 
 def _around(job: Any, frames: Any, pictures: Any, how: dict[str, Any]) -> None:
@@ -122,8 +153,7 @@ def _around(job: Any, frames: Any, pictures: Any, how: dict[str, Any]) -> None:
     eye = how["eye"] or None
     if isinstance(eye, str):
         raise click.UsageError("--eye: expected AZIMUTH,HEIGHT,DISTANCE on a ring of viewers")
-    names = ("content", "tones", "slices", "photometric", "aperture", "focus", "size")
-    options = EyeOptions(eye=eye, **{name: how[name] for name in names})
+    options = EyeOptions(eye=eye, **{name: how[name] for name in (*_RING, "size")})
     for line in write_eye_pictures(job, frames, options, pictures):
         click.echo(line)
 

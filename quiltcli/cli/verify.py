@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import PATH, SETS, THREADS
+from quiltcli.cli.options import PATH, SETS, THREADS, refuse_typed
 from quiltcli.cli.printing import print_aligned
 
 
@@ -45,6 +45,7 @@ def verify(
 
     loaded = load_job(job, sets)
     if loaded.ring is not None:
+        refuse_typed("on a ring of viewers", ("eye", "picture"))
         _verify_turn(loaded, (frame, everything, pixels, output, redraw), as_json)
         return
     options = VerifyOptions(frame, everything, pixels or SAMPLE, output, redraw, threads or 0, eye or "")

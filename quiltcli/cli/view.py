@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quiltcli.cli.options import EXPOSURE, PATH, VIEW, frames_option
+from quiltcli.cli.options import EXPOSURE, PATH, VIEW, frames_option, refuse_typed
 
 
 @click.command()
@@ -48,6 +48,8 @@ def view(out: Path, frames: tuple[int, ...] | None, output: Path | None, **how: 
     from quiltcli.images.turns import is_ring_output
 
     if is_ring_output(out):
+        idle = ("filter", "errors", "ghost", "texture")
+        refuse_typed("on a page of a spinning mirror", idle)
         from quiltcli.exchange.web.turning import Turning, turning_view
 
         wishes = Turning(view=how["view"], exposure=how["exposure"], size_mb=how["size"])

@@ -29,9 +29,11 @@ def display_notices(facets: Facets) -> Iterator[str]:
         if len(pairs) > _MOST_PAIRS:
             yield f"{facets.path}: {len(pairs) - _MOST_PAIRS} more pairs of facets disagree on their lit side"
     least, greatest = pitch_mm(facets)
-    if facets.enabled.any() and (least < 0.1 or greatest > 100):
+    projected = any(chart is not None and not chart.stands for chart in facets.charts)
+    if facets.enabled.any() and not projected and (least < 0.1 or greatest > 100):
+        low, high = f"{least:.3g}", f"{greatest:.3g}"
         yield (
-            f"the pixel pitch is {least:.3g} to {greatest:.3g} mm, outside 0.1 to 100 mm:"
+            f"the pixel pitch is {low if low == high else f'{low} to {high}'} mm, outside 0.1 to 100 mm:"
             " are the display's units and resolution right?"
         )
     extent = float(np.ptp(facets.corners, axis=0).max())

@@ -88,7 +88,7 @@ def read_points(path: Path) -> tuple[IntArray, FloatArray, int]:
     Raises:
         DisplayError: no JSON, no list, things in it that are no points, none or too many of them.
     """
-    data = read_input(path, DisplayError, "a list of points")
+    data = read_input(path, DisplayError, "a JSON")
     try:
         entries = json.loads(data.decode("utf-8-sig", "strict"))
     except UnicodeDecodeError as error:

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.errors import OutputError, Problem
+from quiltcli.errors import OutputError, Problem, QuiltError
 from quiltcli.exchange.film.reels import Reel, reels_of
+from quiltcli.exchange.pixelmaps import known_display
 from quiltcli.formats.whole import make_folder, write_bytes
 from quiltcli.geometry import FloatArray, IntArray
 from quiltcli.images.names import frame_digits, layout_path
@@ -63,12 +64,14 @@ class Lights:
     """N lights of a page.
 
     Attributes:
-        number: (N,) numbers in the list, from 0.
+        number: (N,) numbers in the list, from 0, ascending.
+        pixel: (N,) their pixels in the page, row by row.
         place: (N, 3) where they are, world metres.
         count: length of the list up to the last that is there.
     """
 
     number: IntArray
+    pixel: IntArray
     place: FloatArray
     count: int
 
@@ -133,10 +136,26 @@ def lights_of(out: Path) -> Lights:
         facet, size = int(layout.facet[odd[0]]), layout.size[odd[0]].tolist()
         words = f"facet {facet} is {size[0]} × {size[1]} pixels on page {int(layout.page[odd[0]]) + 1}"
         raise OutputError(Problem(f"is no render of points: {words} (expected one of one page)", str(out)))
-    number = corner[:, 1] * int(layout.pages[0, 0]) + corner[:, 0]
+    pixel = corner[:, 1] * int(layout.pages[0, 0]) + corner[:, 0]
+    number = _numbers(layout, pixel)
     order = np.argsort(number)
     place = layout.origin + (layout.du + layout.dv) / 2
-    return Lights(number[order], place[order], int(number.max()) + 1)
+    return Lights(number[order], pixel[order], place[order], int(number.max()) + 1)
+
+
+def _numbers(layout: Layout, pixel: IntArray) -> IntArray:
+    """Numbers in the list (F,) of a layout's facets: by the display if it is there, else by the page."""
+    try:
+        facets = known_display(layout)
+    except QuiltError:
+        facets = None
+    if facets is None or facets.sha256 != layout.display_sha256 or facets.places is None:
+        return pixel
+    size = facets.places.page_size
+    if size is None:
+        return pixel
+    own = facets.places.corner[np.searchsorted(facets.places.facet, layout.facet)].astype(np.int64)
+    return np.asarray(own[:, 1] * size[0] + own[:, 0])
 
 
 def _corners(layout: Layout) -> IntArray:
@@ -171,7 +190,7 @@ def _values(light: NDArray[Any], lights: Lights, wiring: Wiring) -> NDArray[Any]
     """Values (count, 3) of all numbers up to the last, 0 for those that are not there."""
     flat = display_values(light, wiring.look).reshape(-1, 3)
     result = np.zeros((lights.count, 3), dtype=np.uint8 if wiring.look.depth == 8 else np.dtype(">u2"))
-    result[lights.number] = flat[lights.number][:, ["rgb".index(name) for name in wiring.order]]
+    result[lights.number] = flat[lights.pixel][:, ["rgb".index(name) for name in wiring.order]]
     return result
 
 

@@ -207,8 +207,11 @@ class PanelSpec(Model):
         return step * self.pixels[0], step * self.pixels[1]
 
 
+_NOT_PROJECTED = ("mesh", "panels", "surfaces", "points", "projection", "resolution", "transform", "layout")
+
+
 class DisplayFile(FileModel):
-    """A display: the faces of a mesh, panels, curved surfaces, or a projection about the eye."""
+    """A display: the faces of a mesh, panels, curved surfaces, projectors, or a projection about the eye."""
 
     kind: ClassVar[str] = "quilt_display"
 
@@ -309,7 +312,7 @@ class DisplayFile(FileModel):
                 if getattr(self, name) is not None:
                     yield (name,), "belongs to projectors (expected projectors: a list of them)"
             return
-        for name in ("mesh", "panels", "surfaces", "projection", "resolution", "transform", "layout"):
+        for name in _NOT_PROJECTED:
             if getattr(self, name) is not None:
                 yield (name,), "cannot stand beside projectors (the screen's file says where it stands)"
         if self.facets:
@@ -337,6 +340,9 @@ class DisplayFile(FileModel):
                 yield (name,), "cannot stand beside points (points are the whole display, a pixel each)"
         if self.facets:
             yield ("facets",), "cannot stand beside points (points are the whole display, a pixel each)"
+        if self.corrections is not None and self.corrections.brightness is not None:
+            words = "belongs to panels, which darken aslant (points have no side that they face)"
+            yield ("corrections", "brightness"), words
         if self.viewing_side == "back":
             yield (
                 ("viewing_side",),

@@ -20,7 +20,7 @@ import numpy as np
 
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.yaml.source import Source, parse_text
-from quiltcli.formats.yaml.syntax import read_text
+from quiltcli.formats.yaml.syntax import read_yaml_text
 from quiltcli.geometry import FloatArray, Int32Array, IntArray, offsets, some_rows
 from quiltcli.job.layout import LayoutFile
 from quiltcli.job.layout_columns import ColumnLines, Columns, read_columns
@@ -119,7 +119,7 @@ def read_layout_table(path: Path | str) -> LayoutTable:
         JobError: with every problem of the file.
     """
     path = Path(path)
-    text = read_text(path)
+    text = read_yaml_text(path)
     return _from_lines(text, path) or table_of(load_layout_file(path))
 
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.inputs import check_input
 from quiltcli.formats.yaml.source import Source, YamlFile, parse_text, parse_yaml
-from quiltcli.formats.yaml.syntax import read_text
+from quiltcli.formats.yaml.syntax import read_yaml_text
 from quiltcli.job.calibration import CalibrationFile
 from quiltcli.job.camera import CameraFile
 from quiltcli.job.display import DisplayFile
@@ -210,7 +210,7 @@ def file_kind(path: Path | str) -> str:
     Raises:
         JobError: it is none of them.
     """
-    text = read_text(Path(path))
+    text = read_yaml_text(Path(path))
     # A layout may be long: its first line is enough, for whoever reads it finds what is wrong.
     if (first := _FIRST_KEY.match(text)) and first[1] == LayoutFile.kind:
         return LayoutFile.kind

@@ -30,6 +30,7 @@ from quiltcli.job.timing import Timing
 
 KIND = "lightfield360"
 """What `kind` says in such a display file."""
+_MOST_PIXELS = 8192
 Row = Annotated[tuple[Number, Number, Number, Number], Items(4)]
 PixelFromWorld = Annotated[tuple[Row, Row, Row], Items(3, "rows of 4 numbers")]
 ClicksPath = Annotated[Path, ExistingFile(YAMLS, "a calibration file")]
@@ -180,7 +181,9 @@ class MirrorDisplayFile(FileModel):
     """`rgb` for a projector of three chips with pictures of their own; one stream of pictures when absent."""
 
     def cross_checks(self) -> Iterator[Complaint]:
-        """Two sides look away from one another; colours come one way; the projector reaches the mirror."""
+        """No projector has so many pixels; sides look away from one another; light reaches the mirror."""
+        if max(self.image) > _MOST_PIXELS:
+            yield ("image",), f"expected at most {_MOST_PIXELS} a side, got {self.image[0]} × {self.image[1]}"
         if self.sides is not None:
             apart = (self.sides[1].azimuth_deg - self.sides[0].azimuth_deg) % 360
             if abs(apart - 180) > 1e-9:

@@ -166,6 +166,8 @@ class ObjectSpec(Model):
     """What to change of the materials in the mesh file."""
     normals: Annotated[str, OneOf(("auto", "flat", "smooth"))] = "auto"
     """Shade each triangle flat, smooth over the vertices, or (auto) as the mesh file says."""
+    subdivision: Annotated[int, Field(ge=0, le=5)] = 0
+    """Number of times subdivision surfaces (of USD) are refined, into 4 times the faces; 0 for cages."""
     animation: AnimationSpec | None = None
     """Play the animation in the mesh file; without this key it rests."""
     casts_shadows: bool = True

@@ -141,7 +141,7 @@ def load_objects(spec: SceneFile) -> tuple[SceneObject, ...]:
     Raises:
         SceneError: as for `load_scene`.
     """
-    assets: dict[Path, Asset] = {}
+    assets: dict[tuple[Path, int], Asset] = {}
     objects: list[SceneObject] = []
     problems: list[Problem] = []
     for index, item in enumerate(spec.objects):

@@ -83,21 +83,22 @@ class SceneObject(Protocol):
         """Why there is nothing to show in some of the frames, one sentence for each reason."""
 
 
-def load_object(item: ObjectSpec, assets: dict[Path, Asset]) -> SceneObject:
+def load_object(item: ObjectSpec, assets: dict[tuple[Path, int], Asset]) -> SceneObject:
     """Read, place and bake an object as it is at its start.
 
     Args:
         item: what the scene file says of it.
-        assets: meshes that are read already; others are added.
+        assets: meshes that are read already, by their subdivision, too; others are added.
 
     Raises:
         SceneError: the mesh cannot be read, or a sequence has no file for a number.
     """
     if item.sequence is not None:
         return _load_sequence(item, item.sequence)
-    if item.mesh not in assets:
-        assets[item.mesh] = read_asset(item.mesh)
-    asset = assets[item.mesh]
+    key = item.mesh, item.subdivision
+    if key not in assets:
+        assets[key] = read_asset(*key)
+    asset = assets[key]
     playing = _playing(item, asset)
     time = None if item.animation is None else item.animation.offset
     matrix = item.world_from_mesh()
@@ -341,7 +342,7 @@ class NumberedMeshes:
         key = number, b"" if matrix is None else matrix.tobytes()
         if key not in self._kept:
             path = numbered(self.files.pattern, number)
-            self._kept[key] = bring(self.item, read_asset(path), matrix=matrix)
+            self._kept[key] = bring(self.item, read_asset(path, self.item.subdivision), matrix=matrix)
             while len(self._kept) > _KEPT:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)

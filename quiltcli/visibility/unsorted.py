@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from quiltcli.errors import JobError
 from quiltcli.geometry import BoolArray, FloatArray, Int32Array, IntArray
 from quiltcli.projection.planar import QuiltRays
 from quiltcli.scene import Scene
@@ -21,6 +22,8 @@ from quiltcli.visibility.draw import Blocks, block_keys, pairs_by_block, triangl
 from quiltcli.visibility.shares import Binned, Share, faces_eye, join, sight_of, unseen
 
 _AT_ONCE = 1 << 18
+MOST_PAIRS = 100_000_000
+"""Of triangles and facets in a frame, a few bytes each."""
 
 Sent: TypeAlias = Iterator[tuple[int, IntArray]]
 Sending: TypeAlias = Callable[[FloatArray, Int32Array, IntArray, Cones], Sent]
@@ -64,6 +67,9 @@ def bin_unsorted(
         single: (T,) triangles that are left out where they face away; None for none.
         culling: whether all are left out that face away.
         reach: pixels by which samples lie beside the centres of their pixels, at most.
+
+    Raises:
+        JobError: more pairs than memory is likely to hold.
     """
     seen = unseen(scene)
     np.subtract(scene.vertices, viewer.eye, out=seen.vertices)
@@ -77,6 +83,11 @@ def bin_unsorted(
     reached = np.zeros(wanted.size, dtype=np.bool_)
     keys, count = [np.zeros(0, dtype=np.int64)], 0
     for pairs in _together(send(seen.vertices, scene.triangles, drawn, cones)):
+        if count + pairs.triangle.size > MOST_PAIRS:
+            raise JobError(
+                f"frame {viewer.frame}: without sorting, more than {MOST_PAIRS:,} pairs of triangles and"
+                " facets would be drawn (expected fewer of either; method: homography sorts them)"
+            )
         keys.append(block_keys(pairs, sight, rays, blocks, reach))
         reached[pairs.triangle] = True
         count += pairs.triangle.size

@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import argparse
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -16,17 +18,20 @@ from PIL import Image
 
 from quiltcli.analysis.simulate import PictureOptions, simulate
 from quiltcli.display import lit_facets
-from quiltcli.images.preview import tone_map
+from quiltcli.images.preview import preview, tone_map
+from quiltcli.images.stereo.files import StereoOptions, write_stereo
 from quiltcli.job import load_job
 from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.crew import plan_of
 from quiltcli.render.methods import draw_frame
+from quiltcli.render.sequence import render
 from quiltcli.render.setup import Stage, set_stage
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame, batches, draw
 from quiltcli.visibility.rays.embree import aim
 from quiltcli.visibility.shares import bin_frame
 from tests.benchmarks.page import put
+from tests.helpers.camera_texture import as_facets, as_projection
 from tests.helpers.curved_jobs import boxes, curved_job
 
 ROOT = Path(__file__).parents[2]
@@ -41,6 +46,9 @@ DEMOS = {
     "bezier_panel": ("room", (0.3, 1.5, 2.6), (0, 1.4, 0), None),
     "panorama160": ("city", (0, 1.7, 0), (0, 1.7, -5), None),
 }
+
+CLOSE = np.s_[536:565, 826:865]
+"""Rows and columns of the close views."""
 
 
 def staged(display: str, scene: str, eye: object, at: object, more: str = "") -> tuple[Stage, Viewer]:
@@ -104,6 +112,47 @@ def demo_pictures() -> Iterator[Path]:
     yield path
 
 
+def close_ups() -> Path:
+    """A few pixels of the city's panorama: exact, in strips, by way of a cube map, and with samples."""
+    eye, at, tiles = (0, 1.7, 0), (0, 1.7, -1), []
+    for more, how in (
+        ("", ""),
+        (", pieces: 20", ""),
+        ("", "render: {method: cubemap, faces: 512}\n"),
+        ("", "render: {samples: 16}\n"),
+    ):
+        display = f"quilt_display: 1\nprojection: {{kind: cylinder{more}, pixels: [1600, 1200]}}\n"
+        stage, viewer = staged(display, "city", eye, at, how + "output: {channels: [rgba]}\n")
+        light = np.stack([drawn(stage, viewer)[0][c].reshape(1200, 1600) for c in "RGB"], axis=2)
+        picture = tone_map(light[CLOSE].astype(np.float32))
+        tiles.append(Image.fromarray(picture).resize((234, 174), Image.Resampling.NEAREST))
+    sheet = Image.new("RGB", (960, 174), (255, 255, 255))
+    for k, tile in enumerate(tiles):
+        sheet.paste(tile, (242 * k, 0))
+    path = PICTURES / "surfaces-close.png"
+    sheet.save(path)
+    return path
+
+
+def two_eyes() -> Path:
+    """A panorama with an eye for each column, for red and cyan glasses."""
+    display = "quilt_display: 1\nprojection: {kind: equirect, omnistereo: true, pixels: [1200, 600]}\n"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "display.yaml").write_text(display)
+        (folder / "job.yaml").write_text(
+            f"quilt_job: 1\ndisplay: display.yaml\nscene: {ROOT}/scenes/room.yaml\nframes: 1\nviewer:\n"
+            "  near: 0.02\n  far: 2000\n  stereo: {separation: 0.064}\n"
+            "  path: {keyframes: [{frame: 1, position: [0, 1.6, 0], look_at: [0, 1.6, -1]}]}\n"
+            "render: {samples: 9}\noutput: {channels: [rgba]}\n"
+        )
+        render(load_job(folder / "job.yaml"))
+        write_stereo(folder / "out", folder / "both", StereoOptions("anaglyph", "page"))
+        path = PICTURES / "surfaces-two-eyes.png"
+        preview(folder / "both" / "page_01.0001.exr", path)
+    return path
+
+
 def pieces_table() -> str:
     """Replication and wrong pixels of a cylinder in flat pieces, beside the exact cylinder."""
     pictures, rows = {}, []
@@ -124,18 +173,33 @@ def pieces_table() -> str:
 
 
 def facets_table() -> str:
-    """Prisms as flat facets: pairs of triangles and facets, as the papers count them."""
-    rows = []
-    for count in (40, 80, 160, 320):
-        stage, viewer = staged(_prism(count), "city", (0, 1.7, 0), (0, 1.7, -1))
-        binned = bin_frame(plan_of(stage, viewer, stage.rays(np.ones(count, dtype=bool), viewer)))
-        rows.append((count, binned.facet_pairs / binned.reaching))
+    """Pictures in flat facets: pairs of triangles and facets, as the papers count them."""
+    rows = [
+        (f"{count} flat facets around", "1.96" if count == 160 else "–", *_pairs(_prism(count)))
+        for count in (40, 80, 160, 320)
+    ]
     display = "quilt_display: 1\nprojection: {kind: cylinder, pixels: [1600, 1200]}\n"
-    stage, viewer = staged(display, "city", (0, 1.7, 0), (0, 1.7, -1))
-    binned = bin_frame(plan_of(stage, viewer, stage.rays(np.ones(1, dtype=bool), viewer)))
-    head = "| panorama | pairs for each triangle |\n| --- | ---: |\n"
-    text = head + "".join(f"| {count} flat facets | {pairs:.2f} |\n" for count, pairs in rows)
-    return text + f"| exact, in patches | {binned.facet_pairs / binned.reaching:.2f} |\n"
+    rows.append(("the same, exact, in patches", "–", *_pairs(display)))
+    size, eye = (1600, 1200), np.array([0, 1.7, 0])
+    for nodes, paper in (((80, 60), "10.06"), ((128, 128), "21.04")):
+        with tempfile.TemporaryDirectory() as name:
+            count = 2 * (nodes[0] - 1) * (nodes[1] - 1)
+            found = _pairs(as_facets(Path(name), *nodes, size, eye))
+            rows.append((f"camera texture as {count:,} flat facets", paper, *found))
+    with tempfile.TemporaryDirectory() as name:
+        found = _pairs(as_projection(Path(name), 128, 128, size))
+        rows.append(("the same as a map of rays, exact, in patches", "–", *found))
+    head = "| picture | the paper | for each triangle of the city | for each that is in view |\n"
+    head += "| --- | ---: | ---: | ---: |\n"
+    return head + "".join(f"| {a} | {b} | {c:.2f} | {d:.2f} |\n" for a, b, c, d in rows)
+
+
+def _pairs(display: str) -> tuple[float, float]:
+    """Pairs for each triangle of the city, and for each that is in view."""
+    more = "render: {bleed: 0}\noutput: {channels: [Z]}\n"
+    stage, viewer = staged(display, "city", (0, 1.7, 0), (0, 1.7, -1), more)
+    binned = bin_frame(plan_of(stage, viewer, stage.rays(np.ones(stage.facets.count, dtype=bool), viewer)))
+    return binned.facet_pairs / binned.triangles, binned.facet_pairs / binned.reaching
 
 
 def _prism(count: int, rows: int = 1) -> str:
@@ -188,6 +252,10 @@ def speed_table() -> str:
     return _table(("display, scene", *columns), rows)
 
 
+_FORMS = ((as_projection, ()), (as_facets, (np.array([0, 1.7, 0]),)))
+"""A camera texture in both forms, and what else each is made of."""
+
+
 def ways_table() -> str:
     """A curved display beside other ways to the same picture, in one run."""
     eye, ahead, street = (0.2, 1.7, 2.5), (0, 1.7, -3), (0, 1.7, 0)
@@ -210,8 +278,12 @@ def ways_table() -> str:
         ),
     }
     rows = []
-    for name, jobs in duels.items():
-        pairs = [staged(*job) for job in jobs]
+    stages = {name: [staged(*job) for job in jobs] for name, jobs in duels.items()}
+    with tempfile.TemporaryDirectory() as name:
+        textures = [make(Path(name), 128, 128, (1600, 1200), *more) for make, more in _FORMS]
+        texts = "camera texture 1600 × 1200 as a map of rays / as 32,258 facets, depth"
+        stages[texts] = [staged(text, "city", street, (0, 1.7, -1), depth) for text in textures]
+    for name, pairs in stages.items():
         times = [[drawn(stage, viewer)[1] for stage, viewer in pairs] for _ in range(4)]
         first, second = np.median(times[1:], axis=0).tolist()
         rows.append((name, f"{first:.2f}", f"{second:.2f}", f"{first / second:.2f}"))
@@ -240,6 +312,38 @@ def _visibility(stage: Stage, viewer: Viewer) -> float:
     for batch in batches(frame):
         draw(frame, batch).done()
     return time.process_time() - begin
+
+
+def memory_table() -> str:
+    """The most memory that `quilt render` takes."""
+    rows = []
+    cases = (
+        ("dome master 4096 × 4096, city", "projection: {kind: dome_master, pixels: [4096, 4096]}", "city"),
+        (
+            "sphere 4096 × 2048 from outside, room",
+            "surfaces:\n- {kind: sphere, radius: 1, at: [0, 1, 0], pixels: [4096, 2048]}",
+            "room",
+        ),
+    )
+    for name, display, scene in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "display.yaml").write_text(f"quilt_display: 1\n{display}\n")
+            job = Path(folder) / "job.yaml"
+            job.write_text(
+                f"quilt_job: 1\ndisplay: display.yaml\nscene: {ROOT}/scenes/{scene}.yaml\nframes: 1\n"
+                "viewer: {near: 0.02, far: 2000, path: {keyframes: [{frame: 1, position: [0.7, 1.6, 2.7],"
+                " look_at: [0, 1, 0]}]}}\n"
+            )
+            code = (
+                "import resource, sys; from quiltcli.cli import main\n"
+                f"try: main(['render', {str(job)!r}, '-j', '1'])\n"
+                "except SystemExit: pass\n"
+                "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+            )
+            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+            rows.append((name, int(done.stdout.split()[-1]) / 1e6))
+    head = "| render of | most memory |\n| --- | ---: |\n"
+    return head + "".join(f"| {name} | {size:.2f} GB |\n" for name, size in rows)
 
 
 def _embree(stage: Stage, viewer: Viewer) -> tuple[int, float]:
@@ -321,6 +425,7 @@ TABLES = {
     "cubemap": cubemap_table,
     "speed": speed_table,
     "ways": ways_table,
+    "memory": memory_table,
 }
 
 
@@ -337,7 +442,7 @@ def main() -> None:
             print(found)
             text = put(text, name, found)
     if given.only in (None, "pictures"):
-        print(*demo_pictures(), sep="\n")
+        print(*demo_pictures(), close_ups(), two_eyes(), sep="\n")
     if given.docs:
         PAGE.write_text(text, encoding="utf-8")
 

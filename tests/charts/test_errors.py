@@ -49,6 +49,11 @@ FORMULA = 'kind: formula, x: "2*s-1", y: "1-2*t", z: "0*s"'
         (FORMULA.replace("0*s", "s.real"), "at character 1: expected numbers, names"),
         (FORMULA.replace("0*s", "open(s)"), "unknown function 'open'"),
         (FORMULA.replace("0*s", "log(s-2)"), "has no point at s ="),
+        *(
+            (FORMULA.replace(place, wild), "has no point at s =")
+            for place in ("2*s-1", "0*s")
+            for wild in ("s/0", "1/(s-0.5)", "9**9**9**9", "1e308*10*s", "exp(1000*s)-exp(999*t)", "sqrt(-s)")
+        ),
         (FORMULA.replace("2*s-1", "0*s"), "is degenerate at s ="),
         (FORMULA.replace("2*s-1", "abs(s-0.41)"), "is folded over near s ="),
         ('kind: implicit, x: s, y: "-t", z: "0*s"', "surfaces[0].zero: missing key"),

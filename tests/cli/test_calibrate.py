@@ -171,3 +171,19 @@ def test_a_board_and_a_distance_take_part(taken, tmp_path):
     again = run(*paths, *words, "--overwrite", "--attached", "2x2,1.4m,0.4m,5x5,400")
     assert again.exit_code == 2
     assert "no photo shows board 1 (expected markers 400 to 403)" in again.output
+
+
+def test_a_rig_takes_photos_of_boards_and_little_else(tmp_path):
+    (tmp_path / "rig.json").write_text("{}")
+    words = (
+        "--display",
+        MODELS / "cube5.yaml",
+        "-o",
+        tmp_path / "fixed.yaml",
+        "--rig",
+        tmp_path / "rig.json",
+    )
+    assert "is no rig (expected the rig.json" in run(tmp_path / "a.jpg", *words).output
+    done = run(tmp_path / "a.jpg", *words, "--distance", "1A-1B=1m")
+    assert "--rig takes --camera and --anchor, not --distance" in done.output
+    assert done.exit_code == 2

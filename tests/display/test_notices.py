@@ -110,3 +110,13 @@ def test_facets_beyond_measure(tmp_path: Path, corner: str, words: str) -> None:
     mesh = f"v 0 0 0\nv {corner} 0 0\nv {corner} {corner} 0\nv 0 {corner} 0\nf 1 2 3 4\n"
     with pytest.raises(DisplayError, match=re.escape(words)):
         facets(display(tmp_path, mesh))
+
+
+def test_pixels_of_a_projection_have_no_pitch_to_doubt(tmp_path: Path) -> None:
+    path = tmp_path / "d.yaml"
+    for pixels in ("[8, 8]", "[4096, 4096]"):
+        path.write_text(f"quilt_display: 1\nprojection: {{kind: dome_master, pixels: {pixels}}}\n")
+        assert list(display_notices(facets(path))) == []
+    path.write_text("quilt_display: 1\npanels:\n- {pixels: [8, 8], pitch: 25 cm, at: [0, 0, 0]}\n")
+    (notice,) = display_notices(facets(path))
+    assert notice.startswith("the pixel pitch is 250 mm, outside 0.1 to 100 mm")

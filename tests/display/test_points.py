@@ -152,6 +152,10 @@ def test_what_is_no_text_is_no_list(tmp_path: Path) -> None:
         ("viewing_side: back\n", "viewing_side: expected no such key beside points"),
         ("transform: {scale: [-1, 1, 1]}\n", "transform: mirrors the display"),
         ("facets: {1: {name: a}}\n", "facets: cannot stand beside points"),
+        (
+            "corrections: {brightness: {exponent: 1}}\n",
+            "corrections.brightness: belongs to panels",
+        ),
     ],
 )
 def test_points_are_the_whole_display(tmp_path: Path, more: str, complaint: str) -> None:

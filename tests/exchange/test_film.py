@@ -143,7 +143,11 @@ def test_a_facet_that_was_left_out_is_black_and_told(out, tmp_path):
 
 def test_what_cannot_be_filmed(out, tmp_path):
     for words, path, options in (
-        (r"is one film, and there are 2 sequences", "a.mov", FilmOptions()),
+        (
+            r"is one film, and there are 2 sequences \(expected a folder, and --codec prores\)",
+            "a.mov",
+            FilmOptions(),
+        ),
         (r"does not say what is wanted", "a.avi", FilmOptions()),
         (r"must end in \.mov for hap", "a.mp4", FilmOptions(codec="hap")),
         (r"has no pages of frames 3 \(it has 9-10\)", "f", FilmOptions(codec="png", frames=(3,))),
@@ -181,3 +185,12 @@ def test_both_eyes_and_the_simulation(tmp_path):
         assert done.exit_code == 0, done.output
         assert files_in(folder) == names
         assert all(str(folder / name) in done.output for name in names)
+
+
+def test_a_spinning_mirror_is_told_from_a_folder_without_pictures(tmp_path):
+    (tmp_path / "none").mkdir()
+    with pytest.raises(OutputError, match="has no images of pages"):
+        make_film(tmp_path / "none", tmp_path / "a.mp4", FilmOptions())
+    (tmp_path / "report.json").write_text('{"kind": "lightfield360", "frames": []}')
+    with pytest.raises(OutputError, match="is of a spinning mirror"):
+        make_film(tmp_path, tmp_path / "a.mp4", FilmOptions())

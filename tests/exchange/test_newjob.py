@@ -159,7 +159,10 @@ def test_lengths_are_written_as_they_are_read(metres: str) -> None:
     [
         (Wishes("cubicle"), "expected one of corner, wall"),
         (replace(SMALL["wall"], size="8by4"), "expected width x height such as 8x4.5m"),
-        (replace(SMALL["wall"], size="8x4"), "expected width x height such as 8x4.5m"),
+        (replace(SMALL["wall"], size="8x4"), "such as 8x4.5m, got '8x4' (units: m, cm, mm, in, ft and px)"),
+        (replace(SMALL["wall"], size="2x1km"), "got '2x1km' (units: m, cm, mm, in, ft and px)"),
+        (replace(SMALL["wall"], size="wide"), "expected width x height such as 8x4.5m, got 'wide'"),
+        (replace(SMALL["corner"], pitch="6 parsec"), "got '6 parsec' (units: m, cm, mm, in, ft)"),
         (replace(SMALL["wall"], pitch="1mm"), "expected one of --pitch"),
         (replace(SMALL["wall"], size="64x32px"), "needs a pitch or a cabinet"),
         (replace(SMALL["corner"], pitch="6"), "expected a length such as 6mm"),

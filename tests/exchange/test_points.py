@@ -123,6 +123,22 @@ def test_light_becomes_values_by_the_view(out: Path, tmp_path: Path) -> None:
     assert list(path.read_bytes()[:6]) == display_values(light, Look("srgb")).reshape(-1).tolist()
 
 
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_page_wider_than_the_list_has_columns_is_no_matter(tmp_path: Path, moved: bool) -> None:
+    """The display says which number each has; where that is gone, the page's pixels are taken for them."""
+    rendered(tmp_path, POINTS, columns=5, frames="1")
+    job = load_job(tmp_path / "job.yaml", ("layout={size: [9, 4]}",))
+    render(job, RenderOptions(folder=tmp_path / "wide"))
+    if moved:
+        (tmp_path / "leds.json").unlink()
+    (path,), lights = write_colors(tmp_path / "wide", tmp_path / "c.rgb", Wiring(RAW))
+    if moved:
+        assert lights.number.tolist() == [0, 1, 2, 4, 9, 10]
+        return
+    assert lights.number.tolist() == [0, 1, 2, 4, 5, 6]
+    assert path.read_bytes() == bytes(v for color in COLORS for v in color)
+
+
 def test_samples_are_the_mean_over_a_light(tmp_path: Path) -> None:
     """A light of 1 mm on the edge of the red square: half of it shows red."""
     points = [[-0.5, 0, -1 + 1e-9], [-1, 0, 0], [3, 2, -4]]

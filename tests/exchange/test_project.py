@@ -376,3 +376,31 @@ def test_no_number_and_too_bright_a_one_stay_where_they_are():
     assert light.min() >= 0
     assert light[10, 10, 0] > 1000
     assert (light[:, 15, 0] == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("kind", "stereo", "size", "said"),
+    [
+        ("equirect", "", (40, 20), ""),
+        ("equirect", "", (40, 16), "has 40×16 pixels, and one of all directions is twice as wide as high"),
+        ("equirect", "", (20, 20), "(is it two eyes', --stereo top-bottom?)"),
+        ("equirect", "side-by-side", (20, 20), ""),
+        ("equirect", "top-bottom", (40, 10), ""),
+        ("equirect", "top-bottom", (40, 20), ""),
+        ("equirect", "top-bottom", (40, 13), "twice as wide as high"),
+        ("fisheye", "", (40, 16), ""),
+        ("pinhole", "", (20, 20), ""),
+    ],
+)
+def test_pictures_of_an_odd_shape_are_doubted(kind, stereo, size, said, tmp_path):
+    doubt = Master(tmp_path / "m.exr", kind, stereo=stereo).doubt(size)
+    assert said in doubt
+    assert bool(doubt) == bool(said)
+
+
+def test_a_panorama_of_an_odd_shape_is_told_of(job, tmp_path):
+    put(tmp_path / "m.exr", np.zeros((20, 50, 4), np.float32))
+    (record,) = project(
+        load_job(job), Master(tmp_path / "m.exr", "equirect"), MadeOptions(tmp_path / "o", [1])
+    )
+    assert "the picture has 50×20 pixels" in " ".join(record.warnings)

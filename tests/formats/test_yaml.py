@@ -93,6 +93,17 @@ def test_message(raw: bytes, expected: str, tmp_path: Path) -> None:
     assert message(tmp_path, raw) == expected
 
 
+@pytest.mark.parametrize("name", ["ball.obj", "ball.GLB", "page.0001.exr", "shot.jpg"])
+def test_meshes_and_pictures_are_called_by_their_kind(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_bytes(b"v 0 0 0\n\xff")
+    with pytest.raises(JobError) as caught:
+        read_yaml(path)
+    assert str(caught.value) == f"{path}: is a {path.suffix.lower()} file (expected a YAML file)"
+    with pytest.raises(JobError, match="no such file"):
+        read_yaml(tmp_path / "none.obj")
+
+
 _MERGES = b"a0: &a0 {x: 1}\n" + b"".join(
     b"a%d: &a%d {k%d: 1, <<: [%s]}\n" % (n, n, n, b", ".join([b"*a%d" % (n - 1)] * 10)) for n in range(1, 12)
 )

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -142,6 +143,110 @@ GLTF = """\
  "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
   {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}]}
 """
+USD = """\
+#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+    startTimeCode = 1
+    endTimeCode = 8
+)
+def Xform "x"
+{
+    double3 xformOp:translate.timeSamples = { 1: (0, 0, 0), 8: (0, 1, 0) }
+    float xformOp:rotateZ = 30
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateZ"]
+    def Mesh "m" (prepend apiSchemas = ["MaterialBindingAPI"])
+    {
+        point3f[] points = [(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)]
+        int[] faceVertexCounts = [3, 3]
+        int[] faceVertexIndices = [0, 1, 2, 0, 2, 3]
+        int[] holeIndices = []
+        uniform token subdivisionScheme = "none"
+        uniform token orientation = "rightHanded"
+        texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] (interpolation = "vertex")
+        int[] primvars:st:indices = [0, 1, 2, 3]
+        color3f[] primvars:displayColor = [(1, 0, 0), (0, 1, 0)] (interpolation = "uniform")
+        rel material:binding = </looks/red>
+    }
+}
+def PointInstancer "many"
+{
+    rel prototypes = [</many/p>, </many/q>]
+    int[] protoIndices = [0, 1, 0]
+    point3f[] positions = [(0, 0, 0), (3, 0, 0), (4, 0, 0)]
+    quath[] orientations = [(1, 0, 0, 0), (1, 0, 0, 0), (1, 0, 0, 0)]
+    int64[] ids = [1, 2, 3]
+    int64[] invisibleIds = [2]
+    def Mesh "p"
+    {
+        point3f[] points.timeSamples = {
+            1: [(0, 0, 0), (1, 0, 0), (0, 0, 1)],
+            8: [(0, 0, 0), (2, 0, 0), (0, 0, 1)],
+        }
+        int[] faceVertexCounts = [3]
+        int[] faceVertexIndices = [0, 1, 2]
+        uniform token subdivisionScheme = "none"
+        token visibility.timeSamples = { 1: "inherited", 4: "invisible" }
+    }
+    def Sphere "q"
+    {
+        double radius = 0.5
+    }
+}
+def "looks"
+{
+    def Material "red"
+    {
+        token outputs:surface.connect = </looks/red/s.outputs:surface>
+        def Shader "s"
+        {
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor.connect = </looks/red/t.outputs:rgb>
+            float inputs:roughness = 0.5
+            float inputs:opacity = 0.5
+            token outputs:surface
+        }
+        def Shader "t"
+        {
+            uniform token info:id = "UsdUVTexture"
+            asset inputs:file = @./red.png@
+            float2 inputs:st.connect = </looks/red/c.outputs:result>
+            float4 inputs:scale = (1, 0.5, 1, 1)
+            float3 outputs:rgb
+        }
+        def Shader "c"
+        {
+            uniform token info:id = "UsdTransform2d"
+            float2 inputs:in.connect = </looks/red/r.outputs:result>
+            float inputs:rotation = 30
+            float2 outputs:result
+        }
+        def Shader "r"
+        {
+            uniform token info:id = "UsdPrimvarReader_float2"
+            string inputs:varname = "st"
+            float2 outputs:result
+        }
+    }
+}
+def RectLight "lamp"
+{
+    float inputs:width = 2
+    float inputs:intensity = 3
+    float inputs:exposure = 1
+}
+"""
+USD_SCENE = "quilt_scene: 1\nobjects: [{mesh: m.usda, animation: {}}]\nlights: file\n"
+POINTS = '[[0, 0, 0], [1, 0.5, -2e-1], null, {"point": [0, 2, 0]}, [0, 0, 3]]\n'
+LIGHTS = "quilt_display: 1\npoints: {file: leds.json, size: 8 mm, columns: 3}\nunits: cm\n"
+LOG = """\
+person,task,display,optimal_length,path_length,undos,motions,seconds,overall
+ann,easy,wall,10,12,1,30,60.5,4
+ann,easy,ball,10,10,0,40,50,5
+bob,easy,wall,10,20,3,10,90,
+bob,easy,ball,10,14,1,35,70,3
+"""
 MESH_DISPLAY = "quilt_display: 1\nmesh: {mesh}\nresolution: {{pixels_per_metre: 8}}\n"
 
 
@@ -181,12 +286,22 @@ def _map(suffix: str) -> tuple[str, ...]:
     )
 
 
+def has_usd() -> bool:
+    """Whether the extra `usd` is there."""
+    return importlib.util.find_spec("pxr") is not None
+
+
+# Binary stages are left to their library, which takes memory for whatever counts it is told.
+_STAGES = (Kind("usda", "m.usda", "text", ("info m.usda", _RENDER), {"scene.yaml": USD_SCENE}),)
 KINDS = (
     Kind("job", "job.yaml", "yaml", ("check job.yaml", _RENDER)),
     Kind("orbit", "job.yaml", "yaml", ("check job.yaml", "info job.yaml", _RENDER), {"job.yaml": ORBIT}),
     Kind("tracked", "job.yaml", "yaml", ("check job.yaml", _RENDER), {"job.yaml": TRACKED}),
     Kind("track", "track.csv", "text", ("check job.yaml", "info job.yaml", _RENDER), {"job.yaml": TRACKED}),
     Kind("display", "display.yaml", "yaml", ("check display.yaml", "info display.yaml", "pack display.yaml --method rows --size 80x80 -o l.yaml", "check l.yaml")),
+    Kind("points", "leds.json", "json", ("check display.yaml", "info display.yaml", "pack display.yaml -o l.yaml", "check l.yaml"), {"leds.json": POINTS, "display.yaml": LIGHTS}),
+    Kind("lights", "display.yaml", "yaml", ("check display.yaml", "info display.yaml", "pack display.yaml -o l.yaml"), {"leds.json": POINTS, "display.yaml": LIGHTS}),
+    Kind("study", "log.csv", "text", ("study log.csv -o r.html", "study log.csv --skip hard"), {"log.csv": LOG}),
     Kind("scene", "scene.yaml", "yaml", ("check scene.yaml", "info scene.yaml", _RENDER)),
     Kind("layout", "layout.yaml", "yaml", ("check layout.yaml", "info layout.yaml", *_EXPORTS)),
     Kind("columns", "c.npz", "bytes", ("check c.yaml", "info c.yaml")),
@@ -202,6 +317,7 @@ KINDS = (
     Kind("stl-binary", "b.stl", "bytes", ("info b.stl",)),
     Kind("gltf", "m.gltf", "json", _mesh("gltf")),
     Kind("glb", "b.glb", "bytes", ("info b.glb",)),
+    *(_STAGES if has_usd() else ()),
     Kind("exr", "out/quilt/page_01.0001.exr", "exr", (
         "info out/quilt/page_01.0001.exr", "info --json out/quilt/page_01.0001.exr",
         "preview out/quilt/page_01.0001.exr -o p.png", "diff out/quilt/page_01.0001.exr out/quilt/page_01.0002.exr",
@@ -222,6 +338,7 @@ def write_seeds(folder: Path) -> None:
     texts = {
         "job.yaml": JOB, "display.yaml": DISPLAY, "scene.yaml": SCENE, "track.csv": TRACK, "m.obj": OBJ,
         "m.mtl": MTL, "m.ply": PLY, "m.off": OFF, "m.stl": STL, "m.gltf": GLTF,
+        "m.usda": USD,
     }  # fmt: skip
     for name, text in texts.items():
         (folder / name).write_text(text)

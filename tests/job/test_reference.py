@@ -19,7 +19,7 @@ MEASURES = r"metre|pixel|degree|second|frame|m, cm|megabyte|linear|radian|m/s|Hz
 BARE = {
     *("quilt_display", "quilt_job", "quilt_layout", "quilt_scene", "quilt_lightfield", "quilt_calibration"),
     *("views", "first_view", "first_row", "count"),
-    *("id", "page", "max_pages", "page_facets", "samples"),
+    *("id", "page", "max_pages", "page_facets", "samples", "subdivision"),
     *("aspect", "metallic", "roughness", "specular", "opacity", "cutoff", "scale", "matrix", "facets"),
     *("exponents", "weights", "knots_s", "knots_t", "constants", "center", "pieces", "threshold"),
     *("look", "up", "direction", "color", "emission", "orientation", "positions", "images", "rpm"),

@@ -71,6 +71,7 @@ def test_defaults_are_the_papers(folder: Path) -> None:
             "projector.matrix: has the mirror behind the projector",
         ),
         ("{disk: 0.13}", "{disk: 0.13, rectangle: [1, 1]}", "mirror.outline.rectangle: cannot stand beside"),
+        ("mirror:", "image: [9000, 768]\nmirror:", "image: expected at most 8192 a side, got 9000 × 768"),
         ("{disk: 0.13}", "{disk: 1.5}", "mirror.outline: reaches 0.75 m, as far as the projector is high"),
         ("outline", "tilt_deg: 80, outline", "mirror.tilt_deg: must be at most 70, got 80"),
         ("mirror:", "packing: {rpm: 900}\nmirror:", "packing.rpm: does not fit: 24 × 200 pictures a second"),

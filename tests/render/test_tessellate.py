@@ -39,6 +39,18 @@ def test_wrong_pixels_fall_with_the_threshold(tmp_path: Path) -> None:
     assert np.abs(red - exact_red)[same].max() < 0.02
 
 
+@pytest.mark.long
+def test_at_the_papers_threshold_one_pixel_in_a_thousand_is_wrong(tmp_path: Path) -> None:
+    display = "surfaces:\n- {kind: sphere, radius: 1, pixels: [1024, 512]}"
+    scene, eye, more = boxes(150, 0.3, 0.45), (1.2, 0.9, 2.7), "output: {channels: [triangle]}\n"
+    pictures = []
+    for how in ("", "render: {method: tessellate, threshold: 0.012}\n"):
+        stage, viewer = staged(curved_job(tmp_path, display, scene, eye, more=how + more))
+        pictures.append(page(stage, drawn(stage, viewer)["triangle"]).copy())
+    exact, found = pictures
+    assert (found != exact)[exact > 0].mean() < 1e-3
+
+
 def test_it_is_for_curved_surfaces(tmp_path: Path) -> None:
     from quiltcli.errors import JobError
 

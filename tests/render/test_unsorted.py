@@ -14,6 +14,7 @@ from quiltcli.job import load_job
 from quiltcli.render.buffers import new_buffers
 from quiltcli.render.methods import draw_frame
 from quiltcli.render.sequence import RenderOptions, render
+from quiltcli.visibility import unsorted
 from tests.helpers.ball_setup import ball_scene, stage_of_facets
 from tests.helpers.tiny_job import write_tiny_job
 
@@ -73,3 +74,23 @@ def test_they_draw_no_motion_blur(tmp_path: Path) -> None:
     said = ("render.method=octree", "render.shutter=0.5", "render.samples=4")
     with pytest.raises(JobError, match="shutter: expected 0 beside method: octree"):
         load_job(write_tiny_job(tmp_path), said)
+
+
+def test_more_pairs_than_memory_holds_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unsorted, "MOST_PAIRS", 900)
+    stage = stage_of_facets(rig.cube(), ball_scene(2), bleed=2)
+    with pytest.raises(JobError, match=r"frame 1: without sorting, more than 900 pairs of triangles"):
+        by(stage, rig.viewer((2.2, 1.8, 3.2)), "independent")
+    _, record = by(stage, rig.viewer((2.2, 1.8, 3.2)), "homography")
+    assert record.pairs < 900
+
+
+def test_workers_draw_the_same(tmp_path: Path) -> None:
+    job = load_job(write_tiny_job(tmp_path, "144, 72"), ("render.method=octree",))
+    for threads in (1, 2):
+        render(job, RenderOptions(folder=tmp_path / str(threads), threads=threads))
+    names = [path.name for path in sorted((tmp_path / "1" / "quilt").iterdir())]
+    assert len(names) == 4
+    for name in names:
+        one, two = ((tmp_path / str(threads) / "quilt" / name).read_bytes() for threads in (1, 2))
+        assert one == two

@@ -80,7 +80,7 @@ def read_log(path: Path, skip: Sequence[str] = ()) -> StudyLog:
     Raises:
         JobError: every line at fault, or nothing left to study.
     """
-    text = read_input(path, JobError, "a CSV file").decode("utf-8-sig", "replace")
+    text = read_input(path, JobError, "a CSV").decode("utf-8-sig", "replace")
     head = next((line for line in text.splitlines() if line.strip() and line[0] != "#"), "")
     delimiter = ";" if ";" in head else ","
     rows = csv.reader(io.StringIO(text), delimiter=delimiter)

@@ -294,7 +294,7 @@ def told(found: EyePicture, who: str) -> Iterator[str]:
     yield f"{'rays off by':<24}{usual:.4f} mm rms, {worst:.4f} mm at most"
     if found.comparison is not None:
         psnr, flip = found.comparison.psnr, found.comparison.flip
-        yield f"{'against a direct picture':<24} {psnr:.1f} dB, ꟻLIP {flip:.4f}"
+        yield f"{'against a direct picture':<25}{psnr:.1f} dB, ꟻLIP {flip:.4f}"
 
 
 __all__ = ["EyeOptions", "EyePicture", "default_eyes", "look_at_display", "ray_errors", "seen_light", "told"]

@@ -18,6 +18,8 @@ from quiltcli.analysis.simulate.lookup import Shown
 from quiltcli.analysis.simulate.overlaps import all_light
 from quiltcli.analysis.simulate.picture import (
     direct_light,
+    displayed_light,
+    exact_images,
     first_triangles,
     outlined,
     seen_from,
@@ -26,6 +28,7 @@ from quiltcli.analysis.simulate.picture import (
 from quiltcli.analysis.simulate.reference import resampled_light
 from quiltcli.analysis.simulate.skin import skin_of
 from quiltcli.analysis.simulate.thirdperson import third_person_camera, third_person_light
+from quiltcli.analysis.simulate.unfolded import unfold
 from quiltcli.errors import JobError
 from quiltcli.geometry import Float32Array, FloatArray
 from quiltcli.images.preview import block_means
@@ -52,6 +55,9 @@ __all__ = [
 ]
 
 
+_GAP = 8  # pixels between the parts of a triptych
+
+
 @dataclass(frozen=True)
 class PictureOptions:
     """What kind of picture is taken.
@@ -70,6 +76,9 @@ class PictureOptions:
         edges: draw a line along the edges of the facets; what is compared is the picture without.
         threads: batches drawn at a time; 0 takes every core.
         eye: `left` or `right` of two eyes; empty for both.
+        triptych: beside each other the scene without a display, the display from the eye, and unfolded; each
+            has the size of a picture.
+        head: draw the viewer's head too, as a third person sees it.
         corrected: whether images make up for the panels, as far as the job wants that.
     """
 
@@ -86,6 +95,8 @@ class PictureOptions:
     edges: bool = False
     threads: int = 0
     eye: str = ""
+    triptych: bool = False
+    head: bool = False
     corrected: bool = True
 
 
@@ -143,17 +154,46 @@ def simulate(
         say(notice)
     # Frame by frame and viewer by viewer, the left eye before the right.
     seen = [(view, number) for view in views for number in range(len(view.viewers))]
+    eyes = np.array([view.viewers[number].eye for view, number in seen])
+    unfolded = unfold(stage.facets, stage.layout, options.size) if options.triptych else None
     for view, number in sorted(seen, key=lambda item: (item[0].frame, item[1])):
         now, viewer = stage.at(view.time), view.viewers[number]
         shown, source = shown_images(now, view, job.output.directory, sha, threads, viewer)
         whose = ".".join(filter(None, (viewer.name, view.eye)))
-        yield replace(take_picture(now, viewer, shown, options), source=source, eye=whose)
+        result = take_picture(now, viewer, shown, options, eyes)
+        if unfolded is not None:
+            result = replace(
+                result, picture=beside(result, unfolded.picture(shown, options.filter, edges=options.edges))
+            )
+        yield replace(result, source=source, eye=whose)
 
 
-def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:
-    """One picture of a display with its images on, with its figures where it is taken from the eye."""
+def beside(result: Simulation, unfolded: Float32Array) -> Float32Array:
+    """The scene without a display, the display from the eye, and unfolded, beside each other (H, …, 3)."""
+    assert result.direct is not None
+    gap = np.zeros((len(unfolded), _GAP, 3), dtype=np.float32)
+    parts = (result.direct.astype(np.float32), gap, result.picture, gap, unfolded)
+    return np.concatenate(parts, axis=1)
+
+
+def take_picture(
+    stage: Stage,
+    viewer: Viewer,
+    shown: Shown,
+    options: PictureOptions,
+    eyes: FloatArray | None = None,
+) -> Simulation:
+    """One picture of a display with its images on, with its figures where it is taken from the eye.
+
+    Args:
+        stage: display and scene.
+        viewer: whose display it is.
+        shown: its images.
+        options: what kind of picture.
+        eyes: (N, 3) all the places of a film's eyes: a third person sees them all, and stands still.
+    """
     if options.third_person:
-        return _third_person(stage, viewer, shown, options)
+        return _third_person(stage, viewer, shown, options, eyes)
     skin = skin_of(stage.facets, viewer)
     camera, fov = _camera(viewer, skin.vertices, options)
     width, height = (options.samples * side for side in options.size)
@@ -169,37 +209,44 @@ def take_picture(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOpt
     picture = plain = block_means(_image(light, width), options.samples)
     if options.edges:
         picture = block_means(_image(outlined(light, facet, width), width), options.samples)
-    if options.place is not None or not options.compare:
+    if options.place is not None or not (options.compare or options.triptych):
         return Simulation(viewer.frame, picture, None, None, "")
     # A display that is to show a share of its light is held against that share of the scene's.
     response = corrects(stage)
     level = np.float32(1.0 if response is None else response.level)
     whole = direct_light(stage, viewer, through, threads)
     direct = block_means(_image(level * whole, width), options.samples)
+    if not options.compare:
+        return Simulation(viewer.frame, picture, direct, None, "")
     on_lit = np.where(lit, facet, -1).reshape(height, width).astype(np.int32)
     covered = block_means((on_lit >= 0)[..., None], options.samples)[..., 0] == 1
     coarse = None
-    if options.resampled and not stage.facets.charts:
+    if options.resampled and stage.facets.charts:
+        again = replace(shown, buffers=exact_images(stage, viewer, threads))
+        coarse, _ = displayed_light(again, camera, through, facet, options.filter, skin, triangle)
+    elif options.resampled:
         coarse = resampled_light(stage, viewer, shown, camera, through, facet, threads, options.filter)
     once = None if coarse is None else block_means(_image(level * coarse, width), options.samples)
     comparison = compare(plain, direct, covered, seam_pixels(on_lit, options.samples), once)
     return Simulation(viewer.frame, picture, direct, comparison, "")
 
 
-def _third_person(stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions) -> Simulation:
+def _third_person(
+    stage: Stage, viewer: Viewer, shown: Shown, options: PictureOptions, eyes: FloatArray | None
+) -> Simulation:
     """A picture of the viewer before the display."""
     place, look_at = (
         None if point is None else np.asarray(point, dtype=np.float64)
         for point in (options.place, options.look_at)
     )
     aspect = options.size[0] / options.size[1]
-    camera, fov = third_person_camera(viewer, stage.facets, place, look_at, aspect)
+    camera, fov = third_person_camera(viewer, stage.facets, place, look_at, aspect, eyes, head=options.head)
     width, height = (options.samples * side for side in options.size)
     through = camera_display(camera, width, height, options.fov or fov)
     threads = options.threads or default_threads()
     seen = seen_from(stage, shown, camera.eye, threads)
     light, facet = third_person_light(
-        stage, viewer, seen, camera, through, options.filter, options.scene, threads
+        stage, viewer, seen, camera, through, options.filter, options.scene, threads, head=options.head
     )
     if options.edges:
         light = outlined(light, facet, width)

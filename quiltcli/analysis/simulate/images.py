@@ -8,11 +8,12 @@ import numpy as np
 
 from quiltcli.analysis.simulate.lookup import Shown
 from quiltcli.geometry import BoolArray, OwnerArray
-from quiltcli.images.facets import page_of, quilt_buffers
+from quiltcli.images.facets import page_of, quilt_buffers, surroundings
 from quiltcli.images.layers import read_view
 from quiltcli.images.metadata import is_complete
 from quiltcli.images.window import whole_frame
 from quiltcli.layout import pixel_owners
+from quiltcli.projection.curved import chart_views
 from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.methods import draw_moment
 from quiltcli.render.moments import moment
@@ -20,6 +21,8 @@ from quiltcli.render.setup import Stage
 from quiltcli.viewer.clip import their_lit_facets
 from quiltcli.viewer.view import View
 from quiltcli.viewer.viewer import Viewer
+
+_ROWS = 256
 
 
 def shown_images(
@@ -50,7 +53,32 @@ def shown_images(
     else:
         buffers, source = new_buffers(stage), "drawn for this picture"
         draw_moment(moment(stage, view), buffers, threads)
-    return Shown(stage.facets, stage.layout, lit, buffers, owners, viewer.eye), source
+    return Shown(
+        stage.facets, stage.layout, lit, buffers, lit_owners(stage, viewer, owners), viewer.eye
+    ), source
+
+
+def lit_owners(stage: Stage, viewer: Viewer, owners: OwnerArray) -> OwnerArray:
+    """Whose every quilt pixel is, those of curved facets that are dark for the viewer nobody's.
+
+    What lies between a pixel that shows an image and one that is dark, as on the rim of a sphere, is of the
+    former alone.
+    """
+    layout, result = stage.layout, owners
+    eye, axes = viewer.eye, viewer.camera_from_world
+    for row, view in enumerate(chart_views(stage.facets.charts, layout, eye, axes, viewer.head)):
+        if view is None or layout.page[row] < 0 or not view.chart.stands:
+            continue
+        result = owners.copy() if result is owners else result
+        x0, y0, x1, y1 = surroundings(layout, row, stage.job.render.bleed + 1)
+        pixels = page_of(result, layout, int(layout.page[row]))[:, x0:x1]
+        x = np.arange(float(x0), float(x1)) + 0.5
+        for first in range(y0, y1, _ROWS):
+            rows = pixels[first : min(first + _ROWS, y1)]
+            y = np.arange(float(first), float(first + len(rows))) + 0.5
+            lit = view.lit(x, y[:, None])
+            rows[(np.abs(rows) == layout.facet[row]) & ~lit] = 0
+    return result
 
 
 def _quilts(stage: Stage, view: View, folder: Path, job_sha: str) -> Buffers | None:

@@ -14,9 +14,10 @@ from quiltcli.geometry import BoolArray, Float32Array, FloatArray, Int32Array, I
 from quiltcli.job import JobFile
 from quiltcli.layout import Layout
 from quiltcli.projection.planar import eye_from_quilt
-from quiltcli.render.buffers import new_buffers
+from quiltcli.render.buffers import Buffers, new_buffers
 from quiltcli.render.corrections import on_panels
 from quiltcli.render.frame import draw_frame
+from quiltcli.render.methods import draw_frame as draw_by_method
 from quiltcli.render.setup import Stage, stage_of
 from quiltcli.scene import Scene
 from quiltcli.scene.bare import bare_scene
@@ -179,6 +180,18 @@ def direct_light(stage: Stage, viewer: Viewer, through: Camera, threads: int) ->
     buffers = new_buffers(direct)
     draw_frame(direct, viewer, buffers, threads)
     return np.stack([buffers[name].astype(np.float32) for name in "RGB"])
+
+
+def exact_images(stage: Stage, viewer: Viewer, threads: int) -> Buffers:
+    """The images of a display as the exact method draws them.
+
+    A curved facet's image is as dense as it, and has no seam: looked up, it is a direct picture that is
+    resampled once.
+    """
+    again = replace(stage, job=exact(with_channels(stage.job, ("rgba",))))
+    buffers = new_buffers(again)
+    draw_by_method(again, viewer, buffers, threads)
+    return buffers
 
 
 def outlined(light: Float32Array, facet: Int32Array, width: int) -> Float32Array:

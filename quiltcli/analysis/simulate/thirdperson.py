@@ -48,6 +48,10 @@ SCENES = ("ghost", "solid", "none")
 RAYS = 8
 """Rays from the eye to the display's outline at most."""
 
+HEAD = (0.075, 0.115, 0.095)
+"""Half of how wide, high and deep a head is, metres."""
+
+_HEAD = (0.30, 0.27, 0.25)
 _EYE, _RAY = (1.0, 0.62, 0.05), (0.95, 0.5, 0.04)
 _ASIDE, _ABOVE = math.radians(55), math.radians(22)
 _GLASS = np.float32(0.3)  # how much of a wall's back shows
@@ -70,14 +74,38 @@ class Marks:
 
 
 def third_person_camera(
-    viewer: Viewer, facets: Facets, place: FloatArray | None, look_at: FloatArray | None, aspect: float
+    viewer: Viewer,
+    facets: Facets,
+    place: FloatArray | None,
+    look_at: FloatArray | None,
+    aspect: float,
+    eyes: FloatArray | None = None,
+    *,
+    head: bool = False,
 ) -> tuple[Viewer, float]:
     """A camera that sees display and eye, and its field of view, degrees from top to bottom.
 
     Without a place it stands aside of the eye and above it: to the right or the left, where it sees more
     of what is lit.
+
+    Args:
+        viewer: who is seen.
+        facets: the display.
+        place: where it stands, world metres.
+        look_at: what it looks at, world metres.
+        aspect: width over height of the picture.
+        eyes: (N, 3) where the viewer's eyes are in all frames, so that the camera is the same for all.
+        head: whether there is a head around the eye.
     """
-    points = np.concatenate((facets.corners, viewer.eye[None]))
+    if eyes is not None and len(eyes) > 1:
+        # Aside of where the viewer is in the mean, or what moves would be the camera.
+        viewer = replace(viewer, eye=eyes.mean(axis=0))
+    else:
+        eyes = viewer.eye[None]
+    points = np.concatenate((facets.corners, eyes))
+    if head:
+        around = 2 * max(HEAD) * np.concatenate((np.eye(3), -np.eye(3)))
+        points = np.concatenate((points, (eyes[:, None] + around).reshape(-1, 3)))
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = float(np.sqrt(dot(points - middle, points - middle).max()))
     if place is None:
@@ -130,9 +158,13 @@ def outline_points(
     return np.asarray(corners[chosen])
 
 
-def viewer_marks(viewer: Viewer, points: FloatArray, radius: float, half: float) -> Marks:
-    """The eye as a ball with its look direction, and rays to points (N, 3) of half a thickness."""
+def viewer_marks(
+    viewer: Viewer, points: FloatArray, radius: float, half: float, *, head: bool = False
+) -> Marks:
+    """The eye as a ball with its look direction, rays to points (N, 3) of half a thickness; and a head."""
     parts = [(*_ball(viewer.eye, radius), _EYE)]
+    if head:
+        parts.append((*_head(viewer), _HEAD))
     parts.append((*_box(viewer.eye, viewer.eye + 3.5 * radius * viewer.look, radius / 4), _EYE))
     parts += [(*_box(viewer.eye, point, half), _RAY) for point in points]
     start = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)])
@@ -151,6 +183,16 @@ def _ball(centre: FloatArray, radius: float) -> tuple[FloatArray, Int32Array]:
     a = 25 * row + column
     triangles = np.concatenate((np.stack((a, a + 1, a + 26), 1), np.stack((a, a + 26, a + 25), 1)))
     return centre + radius * ring.reshape(-1, 3), triangles.astype(np.int32)
+
+
+def _head(viewer: Viewer) -> tuple[FloatArray, Int32Array]:
+    """A head of a grown person behind the eye, or behind the place between both, that looks where they do."""
+    ball, triangles = _ball(np.zeros(3), 1.0)
+    between = viewer.eye if viewer.head is None else viewer.head
+    axes = np.stack((cross(viewer.look, viewer.up), viewer.up, viewer.look))
+    # Eyes lie in its front, a little above its middle.
+    middle = between - HEAD[2] * viewer.look - 0.1 * HEAD[1] * viewer.up
+    return middle + (ball * HEAD) @ axes, triangles
 
 
 def _box(start: FloatArray, end: FloatArray, half: float) -> tuple[FloatArray, Int32Array]:
@@ -176,6 +218,8 @@ def third_person_light(
     how: str,
     scene: str,
     threads: int,
+    *,
+    head: bool = False,
 ) -> tuple[Float32Array, Int32Array]:
     """What the camera sees (3, P) linear light, and the facet (P,) that each ray meets, −1 for none.
 
@@ -188,6 +232,7 @@ def third_person_light(
         how: a filter of `lookup.FILTERS`.
         scene: a name of `SCENES`.
         threads: batches drawn at a time.
+        head: draw a head around the eye.
     """
     skin = skin_of(stage.facets, viewer)
     # The backs of flat facets are looked through, like glass.
@@ -198,7 +243,8 @@ def third_person_light(
     size = float(np.sqrt(dot(np.ptp(reach, axis=0), np.ptp(reach, axis=0))))
     thick = float(np.linalg.norm(through[0].dv[0])) * float(np.linalg.norm(reach.mean(axis=0) - camera.eye))
     points = outline_points(viewer, stage.facets, shown.lit, bent=skin.lit_points())
-    marks = viewer_marks(viewer, points, max(0.018 * size, 6 * thick), max(1.2 * thick, 1.2e-3 * size))
+    radius, half = max(0.018 * size, 6 * thick), max(1.2 * thick, 1.2e-3 * size)
+    marks = viewer_marks(viewer, points, radius, half, head=head)
     corners = skin.vertices
     everything = bare_scene(
         np.concatenate((corners, marks.vertices)),

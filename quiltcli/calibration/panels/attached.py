@@ -20,7 +20,7 @@ from quiltcli.calibration.dictionaries import dictionary, open_cv
 from quiltcli.calibration.markers import MarkerSet
 from quiltcli.calibration.panels.adjust import Bundle, Corners
 from quiltcli.calibration.panels.camera import Camera
-from quiltcli.calibration.panels.sightings import Sightings, find_ids
+from quiltcli.calibration.panels.sightings import find_ids
 from quiltcli.calibration.panels.start import miss
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.inputs import read_input
@@ -157,21 +157,21 @@ def check_boards(boards: Sequence[Attached], markers: MarkerSet | None, facets: 
                 raise JobError(f"--attached: facet {facet} is on boards {owner[facet]} and {number}")
 
 
-def find_boards(paths: Sequence[Path], boards: Sequence[Attached]) -> list[SeenBoard]:
-    """Look for boards in photos.
+def find_boards(paths: Sequence[Path], boards: Sequence[Attached]) -> tuple[tuple[int, int], list[SeenBoard]]:
+    """Look for boards in photos; also the photos' width and height.
 
     Raises:
         JobError: as `find_ids`; a board that no photo shows.
     """
-    found = []
+    size, found = (0, 0), []
     for number, board in enumerate(boards, 1):
-        seen: Sightings = find_ids(paths, board.dictionary, board.ids)
+        seen = find_ids(paths, board.dictionary, board.ids)
         if not len(seen.photo):
-            raise JobError(
-                f"no photo shows board {number} (expected markers {board.ids[0]} to {board.ids[-1]})"
-            )
+            words = f"expected markers {board.ids[0]} to {board.ids[-1]}"
+            raise JobError(f"no photo shows board {number} ({words})")
+        size = seen.size
         found.append(SeenBoard(board, seen.photo, seen.marker, seen.pixels))
-    return found
+    return size, found
 
 
 def with_boards(

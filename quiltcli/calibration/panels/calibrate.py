@@ -67,7 +67,7 @@ def calibrate(facets: Facets, photos: Sequence[Path], wishes: Wishes) -> tuple[S
         if not used:
             raise JobError("every photo shows the board (expected photos of the display as well)")
     seen = find_markers(used, markers)
-    return solve(facets, markers, seen, camera, wishes.anchor, find_boards(used, boards)), used
+    return solve(facets, markers, seen, camera, wishes.anchor, find_boards(used, boards)[1]), used
 
 
 def calibrated_files(

@@ -21,6 +21,8 @@ from quiltcli.geometry import FloatArray
 from quiltcli.job import DisplayFile
 from quiltcli.job.lengths import UNITS
 
+_MOST_TURN = 40  # degrees; no panel is put up so much awry
+_MODELS = 64  # facets that may be what others are held against
 COLUMNS = ("facet", "corner", "x", "y", "z")
 
 
@@ -46,7 +48,7 @@ def read_corners(path: Path, facets: Facets, units: str = "m") -> FloatArray:
     Raises:
         JobError: corners that are missing, named twice, on no facet, or no numbers.
     """
-    text = read_input(path, JobError, "a CSV file").decode("utf-8-sig", "replace")
+    text = read_input(path, JobError, "a CSV").decode("utf-8-sig", "replace")
     rows = list(csv.reader(io.StringIO(text), delimiter=";" if ";" in text.partition("\n")[0] else ","))
     if not rows or [name.strip().lower() for name in rows[0]] != list(COLUMNS):
         found = ", ".join(rows[0])[:60] if rows else "nothing"
@@ -97,6 +99,74 @@ def fit_corners(spec: DisplayFile, facets: Facets, corners: FloatArray, mesh: st
     up = (turns @ -facets.dv[..., None])[..., 0]
     up /= np.linalg.norm(up, axis=1)[:, None]
     return Measured(mesh_display(spec, facets, fitted, up, mesh), residual)
+
+
+def doubtful_corners(path: Path, facets: Facets, corners: FloatArray, units: str) -> Iterator[Problem]:
+    """What shows that a table is not of this display: another unit, letters exchanged, another facet.
+
+    A facet that was measured is as large as it should be, but for a quarter, and each of its corners is
+    nearer to its own place than halfway to another's. Shapes are compared, never places: a survey has
+    axes of its own.
+
+    Args:
+        path: the table's file, for the problems.
+        facets: the display as it should be.
+        corners: (C, 3) where its corners were measured, metres.
+        units: what the table is taken to be measured in.
+    """
+    start = facets.corner_start
+    counts = np.diff(start)
+    should = facets.corners - np.repeat(middles_of(facets.corners, start), counts, axis=0)
+    are = corners - np.repeat(middles_of(corners, start), counts, axis=0)
+    sizes = [np.sqrt(np.add.reduceat((points * points).sum(axis=1), start[:-1])) for points in (are, should)]
+    share = sizes[0] / sizes[1]
+    most = max(float(np.median(share)), np.finfo(float).tiny)
+    likely = min(UNITS, key=lambda unit: abs(math.log(most * UNITS[unit] / UNITS[units])))
+    if likely != units and not 0.8 < most < 1.25 and 0.8 < most * UNITS[likely] / UNITS[units] < 1.25:
+        words = f"its facets are {most:.4g} × as large as the display's"
+        yield Problem(f"{words}, taken in {units} (is it measured in {likely}? --units)", file=str(path))
+        return
+    for k, name in enumerate(facets.names):
+        own = slice(start[k], start[k + 1])
+        called = f"facet {k + 1}" + (f" ({name})" if name else "")
+        if not 0.8 < share[k] < 1.25:
+            words = f"{called} is {share[k]:.4g} × as large as in the display (expected about its size)"
+            yield Problem(words, file=str(path))
+            continue
+        fitted = should[own] @ _rotation(should[own], are[own]).T
+        off = np.linalg.norm(are[own] - fitted, axis=1)
+        apart = np.linalg.norm(fitted[:, None] - fitted[None, :], axis=2)
+        nearest = np.where(apart > 0, apart, np.inf).min(axis=1)
+        if (off > nearest / 2).any():
+            worst = int((off / nearest).argmax())
+            yield Problem(
+                f"the corners of {called} do not make its figure: {corner_letter(worst)} is"
+                f" {1000 * off[worst]:.4g} mm from where the others put it"
+                " (are two exchanged? quilt pattern --kind id shows their letters)",
+                file=str(path),
+            )
+
+
+def turned_facets(facets: Facets, corners: FloatArray) -> Iterator[str]:
+    """Facets whose corners make their figure, but turned by over 40° against most others.
+
+    That may be so; but a square fits as well when its letters begin at another corner, or run backwards.
+    """
+    start = facets.corner_start
+    middles, measured = middles_of(facets.corners, start), middles_of(corners, start)
+    turns = np.empty((facets.count, 9))
+    for k in range(facets.count):
+        own = slice(start[k], start[k + 1])
+        turns[k] = _rotation(facets.corners[own] - middles[k], corners[own] - measured[k]).ravel()
+    # The sum of a rotation's products with another is its trace, 1 + 2 cos of the angle between the two.
+    angles = np.degrees(np.arccos(np.clip((turns @ turns[:_MODELS].T - 1) / 2, -1, 1)))
+    model = int((angles < _MOST_TURN).sum(axis=0).argmax())
+    for k in np.flatnonzero(angles[:, model] > _MOST_TURN).tolist():
+        called = f"facet {k + 1}" + (f" ({facets.names[k]})" if facets.names[k] else "")
+        yield (
+            f"{called} is turned by {angles[k, model]:.0f}° against facet {model + 1}, beyond"
+            " what the display has (are its corners lettered as quilt pattern --kind id shows them?)"
+        )
 
 
 def corner_table(facets: Facets, residual: FloatArray) -> Iterator[str]:

@@ -159,7 +159,7 @@ def solve(
     shown = np.isin(np.arange(len(seen.photos)), corners.photo)
     bundle, tied, begun = with_boards(bundle, corners, boards, shown.tolist())
     adjusted = adjust(bundle, tied)
-    _check_camera(adjusted)
+    check_camera(adjusted)
     marker = np.repeat(np.array([m.id for m in markers.markers], np.int64)[seen.marker], 4)
     for board in boards:
         marker = np.append(marker, np.repeat(board.board.first + board.marker, 4))
@@ -236,7 +236,7 @@ def _listed(ids: tuple[int, ...]) -> str:
     return ", ".join(map(str, ids)) if len(ids) < 12 else f"{ids[0]} to {ids[-1]}"
 
 
-def _check_camera(adjusted: Adjusted) -> None:
+def check_camera(adjusted: Adjusted) -> None:
     """Flat things seen from one side fit any focal length."""
     if adjusted.bundle.free:
         focal, deviation = adjusted.bundle.camera.focal[0], adjusted.camera_deviation[0]

@@ -115,7 +115,7 @@ def _target(path: Path, codec: str, name: str, count: int) -> Path:
     if path.suffix.lower() != suffix or path.is_dir():
         return path / f"{name}{suffix}"
     if count > 1:
-        words = f"is one film, and there are {count} sequences (expected a folder)"
+        words = f"is one film, and there are {count} sequences (expected a folder, and --codec {codec})"
         raise OutputError(Problem(words, file=str(path)))
     return path
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from quiltcli.errors import OutputError, Problem
 from quiltcli.formats.exr.image import part_names, read_exr, read_header
 from quiltcli.images.names import facet_names_in, names_in
+from quiltcli.images.turns import is_ring_output
 from quiltcli.images.window import frame_size, whole_frame
 from quiltcli.job.frames import format_frames
 from quiltcli.viewer.view import EYES
@@ -79,6 +80,8 @@ def reels_of(out: Path, kind: str, frames: Sequence[int] | None = None) -> list[
         raise OutputError(Problem(words + (f" (it has {format_frames(known)})" if known else ""), str(out)))
     if not found:
         words = f"has no images of {kind}s (expected the folder that quilt render has written to)"
+        if is_ring_output(out):
+            words = "is of a spinning mirror, which has no films (expected quilt simulate or quilt view)"
         raise OutputError(Problem(words, file=str(out)))
     if gaps := sorted(set(range(every[0], every[-1] + 1, _step(every))) - set(every)):
         words = f"lacks frames {format_frames(gaps)} between others (choose frames with -f)"

@@ -11,6 +11,7 @@ from quiltcli.errors import JobError
 from quiltcli.job.lengths import UNITS, read_length
 
 _SIDES = re.compile(r"\s*(\d[\d./]*(?:\s*[x×]\s*\d[\d./]*)*)\s*([a-z]+)\s*", re.IGNORECASE)
+_NUMBERS = re.compile(r"\s*[-+\d]")
 _MOST_PIXELS = 65536
 
 
@@ -94,7 +95,9 @@ def read_sides(text: str, count: int, option: str) -> tuple[Sided, ...]:
     parts = re.split(r"\s*[x×]\s*", match[1], flags=re.IGNORECASE) if match else []
     unit = match[2].lower() if match else ""
     if len(parts) != count or (unit != "px" and unit not in UNITS):
-        raise JobError(f"{option}: expected {_sides_text(count)} such as {example}, got {text!r}")
+        wrong = f"{option}: expected {_sides_text(count)} such as {example}, got {text!r}"
+        known = f" (units: {', '.join(UNITS)} and px)" if _NUMBERS.match(text) else ""
+        raise JobError(wrong + known)
     sides = []
     for part in parts:
         metres = read_length(f"{part} m")
@@ -117,7 +120,8 @@ def read_metres(text: str, option: str, *, negative: bool = False) -> Fraction:
     """
     metres = read_length(text)
     if metres is None or (metres <= 0 and not negative):
-        raise JobError(f"{option}: expected a length such as 6mm or 2.5m, got {text!r}")
+        known = f" (units: {', '.join(UNITS)})" if metres is None and _NUMBERS.match(text) else ""
+        raise JobError(f"{option}: expected a length such as 6mm or 2.5m, got {text!r}{known}")
     return metres
 
 

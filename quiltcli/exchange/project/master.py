@@ -112,6 +112,16 @@ class Master:
             raise OutputError(Problem("a cube's faces must be square and of one size", file=str(path)))
         return faces
 
+    def doubt(self, size: tuple[int, int]) -> str:
+        """What is odd about a picture of this size (one eye's part of it); empty where nothing is."""
+        width, height = size
+        # Halves may be squeezed: then a picture of both eyes is as wide and high as one of one eye.
+        if self.kind != "equirect" or width == 2 * height or (self.stereo and height in (width, width // 4)):
+            return ""
+        both = " (is it two eyes', --stereo top-bottom?)" if width == height and not self.stereo else ""
+        shape = f"the picture has {width}×{height} pixels"
+        return f"{shape}, and one of all directions is twice as wide as high{both}"
+
     def _read(self, path: Path, frame: int) -> Float32Array:
         if self.is_film:
             return film_picture(path, (frame - 1) / self.fps, self.colorspace)

@@ -123,6 +123,7 @@ def _fill(
     whole, seen = sum(pixels for pixels, _ in shown), sum(count for _, count in shown)
     dark = 1 - seen / whole if whole else 0.0
     warnings = [f"the picture does not show {dark:.1%} of the lit facets' pixels"] if dark > 0.0005 else []
+    warnings += filter(None, [master.doubt(texels.size)])
     warnings += _other_rate(master, view)
     camera = master.camera_of(view, texels.size)
     warnings += [camera.notice(view)] if camera is not None and camera.notice(view) else []

@@ -33,7 +33,8 @@ def read_usd_mesh(path: Path) -> PolygonMesh:
     with understood(path):
         code = library().Usd.TimeCode
         moment = Moment(stage, code.EarliestTime() if stage.range is None else code(stage.range[0]))
-        copies = list(_copies(moment))
+        with np.errstate(all="ignore"):  # places may be anything
+            copies = list(_copies(moment))
     if not any(len(one.counts) for one in copies):
         raise MeshError(Problem("holds no polygons", str(path)))
     counts = np.concatenate([one.counts for one in copies])

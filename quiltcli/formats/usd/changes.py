@@ -103,12 +103,14 @@ class Movement:
     Attributes:
         clock: when; None where nothing does.
         points: pieces whose points change.
-        forms: pieces whose faces, or the number of whose copies, change.
+        faces: pieces whose faces change.
+        forms: these, and pieces the number of whose copies changes.
         dresses: pieces whose colours or texture coordinates do.
     """
 
     clock: Clock | None
     points: frozenset[int]
+    faces: frozenset[int]
     forms: frozenset[int]
     dresses: frozenset[int]
 
@@ -116,14 +118,16 @@ class Movement:
 def movement(stage: Stage, shown: Shown) -> Movement:
     """Find out what moves."""
     changes = Changes(stage)
-    points, forms, dresses = set(), set(), set()
+    points, faces, forms, dresses = set(), set(), set(), set()
     anything = False
     for number, piece in enumerate(shown.pieces):
         if changes.points(piece):
             points.add(number)
         found = [changes.place(place) for place in piece.places]
         anything = anything or any(moves for moves, _ in found)
-        if changes.faces(piece) or any(blinks for _, blinks in found):
+        if changes.faces(piece):
+            faces.add(number)
+        if number in faces or any(blinks for _, blinks in found):
             forms.add(number)
         if changes.dress(piece):
             dresses.add(number)
@@ -133,4 +137,4 @@ def movement(stage: Stage, shown: Shown) -> Movement:
         times = changes.times or {0.0}
         first, last = (min(times), max(times)) if stage.range is None else stage.range
         clock = Clock(first, last, stage.rate)
-    return Movement(clock, frozenset(points), frozenset(forms), frozenset(dresses))
+    return Movement(clock, frozenset(points), frozenset(faces), frozenset(forms), frozenset(dresses))

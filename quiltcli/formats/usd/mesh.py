@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from quiltcli.formats.corners import Carried, Dress, Faces, dressed, faces_of
+from quiltcli.formats.subdivision import SHARP
 from quiltcli.formats.usd.primvars import read_normals, read_primvar
 from quiltcli.formats.usd.stage import Stage, library
 from quiltcli.geometry import FloatArray, IntArray
@@ -92,6 +93,39 @@ def read_dress(stage: Stage, mesh: Any, faces: Faces, asked: Asked, time: Any, *
     sets = get(asked.uv[0], 2), get(asked.uv[1], 2)
     normals = read_normals(stage, mesh, faces.corners, time)
     return dressed(sets, get(asked.color, 3), get(asked.opacity, 1), normals, moving=moving)
+
+
+def read_sharpness(
+    stage: Stage, mesh: Any, time: Any, vertices: int
+) -> tuple[IntArray, FloatArray, IntArray]:
+    """Creases of a cage: edges (E, 2), how sharp they are (E,), and vertices that stay where they are.
+
+    Raises:
+        MeshError: they do not fit one another or the mesh.
+    """
+    chain = _whole(mesh.GetCreaseIndicesAttr().Get(time))
+    lengths = _whole(mesh.GetCreaseLengthsAttr().Get(time))
+    given = mesh.GetCreaseSharpnessesAttr().Get(time)
+    sharpness = np.zeros(0) if given is None else np.asarray(given, dtype=np.float64).reshape(-1)
+    if (lengths < 2).any() or lengths.sum() != chain.size:
+        words = f"sums up to {lengths.sum():,} (expected {chain.size:,} creaseIndices, 2 or more each)"
+        raise stage.error(mesh.GetCreaseLengthsAttr(), words)
+    first = np.ones(chain.size, np.bool_)
+    first[np.cumsum(lengths) - 1] = False
+    starts = np.flatnonzero(first)
+    edges = np.stack((chain[starts], chain[starts + 1]), axis=1)
+    if sharpness.size == lengths.size:
+        sharpness = np.repeat(sharpness, lengths - 1)
+    if sharpness.size != len(edges):
+        words = f"has {sharpness.size:,} values (expected {lengths.size:,} or {len(edges):,})"
+        raise stage.error(mesh.GetCreaseSharpnessesAttr(), words)
+    corners = _whole(mesh.GetCornerIndicesAttr().Get(time))
+    for attribute, rows in ((mesh.GetCreaseIndicesAttr(), chain), (mesh.GetCornerIndicesAttr(), corners)):
+        outside = (rows < 0) | (rows >= vertices)
+        if outside.any():
+            raise stage.error(attribute, f"names point {rows[outside][0]} of {vertices:,}")
+    # 10 is sharp for ever, as USD has it.
+    return edges, np.where(sharpness >= 10, SHARP, np.maximum(np.nan_to_num(sharpness), 0)), corners
 
 
 def subset_rows(stage: Stage, subsets: list[tuple[Any, int]], faces: Faces) -> IntArray:

@@ -85,8 +85,14 @@ class Moment:
         if len(outer) * len(own) > MOST_COPIES:
             words = f"shows {len(outer) * len(own):,} instances of {within.root.GetName()!r}"
             raise self.stage.error(within.prim, f"{words} (expected at most {MOST_COPIES:,})")
-        result: FloatArray = (outer[:, None] @ (own @ local)[None]).reshape(-1, 4, 4)
+        with np.errstate(over="ignore", invalid="ignore"):
+            result: FloatArray = (outer[:, None] @ (own @ local)[None]).reshape(-1, 4, 4)
         return result
+
+    def count(self, place: Place) -> int:
+        """How many copies there are in a place, seen or not."""
+        within = place.within
+        return 1 if within is None else self.count(within.place) * len(self.instances(within))
 
     def instances(self, within: Instancer) -> FloatArray:
         """Instancer from prototype (I, 4, 4) of the instances of one prototype that are not masked."""

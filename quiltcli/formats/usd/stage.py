@@ -100,6 +100,8 @@ def understood(path: Path) -> Iterator[None]:
         yield
     except (pxr.Tf.ErrorException, pxr.Tf.CppException) as error:
         raise MeshError(_problem(path, error)) from None
+    except UnicodeDecodeError:
+        raise MeshError(Problem("holds names or texts that are no UTF-8", str(path))) from None
     finally:
         heard.TakeUncoalescedDiagnostics()
 
@@ -144,8 +146,12 @@ def _described(path: Path, usd: Any, pxr: Any) -> Stage:
 
 def _problem(path: Path, error: Exception) -> Problem:
     """What the library's error says, without the places in its own sources."""
-    found = re.findall(r"at line \d+ in file \S+ : '(.*?)'\s*(?:Error in|$)", str(error), re.DOTALL)
-    words = _one_line(found[0] if found else str(error))
+    try:
+        text = str(error)
+    except UnicodeDecodeError:
+        return Problem("holds names or texts that are no UTF-8", str(path))
+    found = re.findall(r"at line \d+ in file \S+ : '(.*?)'\s*(?:Error in|$)", text, re.DOTALL)
+    words = _one_line(found[0] if found else text)
     place = re.match(re.escape(str(path)) + r":(\d+):(\d+): ", words)
     line, column = (int(place[1]), int(place[2])) if place else (0, 0)
     reason = words[place.end() :] if place else words

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +18,7 @@ from quiltcli.formats.usd.stage import Stage, library, path_of
 
 MOST_PRIMS = 2**21
 MOST_PLACES = 2**20
+SUBDIVIDED = "catmullClark"
 _DEEPEST = 16
 _PLAIN = ("Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape", "Material", "Shader", "")
 _SILENT = (*_PLAIN, "GeomSubset", "NodeGraph", "RenderSettings", "RenderProduct", "RenderVar", "Camera")
@@ -34,6 +35,7 @@ class Piece:
         subsets: those of its faces that have materials of their own, and rows of `materials`.
         skin: what moves its points, or None.
         mesh: its schema, `pxr.UsdGeom.Mesh`; that of another stage for a shape by formula.
+        shelf: that stage, which lives as long as somebody holds it.
     """
 
     prim: Any
@@ -42,6 +44,7 @@ class Piece:
     subsets: tuple[tuple[Any, int], ...]
     skin: Skin | None
     mesh: Any
+    shelf: Any
 
     def asked(self, uv_names: tuple[str, ...]) -> Asked:
         """The primvars that its materials look up, of texture coordinates the first two of these."""
@@ -61,13 +64,13 @@ class Shown:
         pieces: its meshes.
         lights: prims of its lights.
         notices: what is left out.
-        shelf: the stage that holds the meshes of shapes.
+        cages: paths of meshes that are cages of subdivision surfaces.
     """
 
     pieces: tuple[Piece, ...]
     lights: tuple[Any, ...]
     notices: tuple[str, ...]
-    shelf: Any
+    cages: tuple[str, ...]
 
 
 @dataclass(eq=False)
@@ -106,6 +109,7 @@ class _Walk:
     left: Counter[str] = field(default_factory=Counter)
     foreign: list[str] = field(default_factory=list)
     cages: set[str] = field(default_factory=set)
+    foreign_schemes: list[str] = field(default_factory=list)
     shelf: Any = None
     prims: int = 0
     places: int = 0
@@ -123,10 +127,11 @@ class _Walk:
                 one.subsets,
                 skins.get(path_of(one.prim)),
                 one.mesh,
+                self.shelf,
             )
             for one in self.found.values()
         )
-        return Shown(pieces, tuple(self.lights), tuple(self._notices()), self.shelf)
+        return Shown(pieces, tuple(self.lights), tuple(self._notices()), tuple(sorted(self.cages)))
 
     def _take(self, top: Any, within: Instancer | None, depth: int) -> None:
         """All that is shown below a prim, itself included."""
@@ -191,8 +196,11 @@ class _Walk:
                 self.shelf = library().Usd.Stage.CreateInMemory()
             return shape_mesh(self.stage, self.shelf, prim, self.time)
         mesh = geom.Mesh(prim)
-        if mesh.GetSubdivisionSchemeAttr().Get() != "none":
+        scheme = str(mesh.GetSubdivisionSchemeAttr().Get())
+        if scheme == SUBDIVIDED:
             self.cages.add(path_of(prim))
+        elif scheme not in ("none", "bilinear"):
+            self.foreign_schemes.append(path_of(prim))
         return mesh
 
     def _bound(self, prim: Any) -> tuple[tuple[Material | None, ...], tuple[tuple[Any, int], ...]]:
@@ -222,19 +230,17 @@ class _Walk:
     def _notices(self) -> Iterator[str]:
         for words, count in sorted(self.left.items()):
             yield f"{counted(count, words)} left out"
-        if self.cages:
-            yield (
-                f"{_listed(sorted(self.cages))} subdivided by their subdivisionScheme:"
-                " the polygons of the cage are drawn"
-            )
+        if self.foreign_schemes:
+            which = listed(self.foreign_schemes)
+            yield f"subdivided by another scheme than {SUBDIVIDED}, drawn as cages: {which}"
         if self.foreign:
-            yield f"no UsdPreviewSurface, drawn by displayColor: {_listed(self.foreign)}"
+            yield f"no UsdPreviewSurface, drawn by displayColor: {listed(self.foreign)}"
         lost: dict[str, list[str]] = {}
         for material in self.materials.values():
             for what in () if material is None else material.notices:
                 lost.setdefault(what, []).append(material.path)  # type: ignore[union-attr]
         for what, users in lost.items():
-            yield f"{what} is not drawn ({_listed(users)})"
+            yield f"{what} is not drawn ({listed(users)})"
 
 
 def _left_out(prim: Any) -> bool:
@@ -242,6 +248,7 @@ def _left_out(prim: Any) -> bool:
     return library().UsdGeom.Imageable(prim).ComputePurpose() in ("proxy", "guide")
 
 
-def _listed(names: list[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """The first names of some, and how many more there are."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + more

@@ -15,7 +15,7 @@ import yaml
 
 from quiltcli.errors import JobError, Problem
 from quiltcli.formats.yaml.core import CORE
-from quiltcli.formats.yaml.syntax import compose, place, read_text
+from quiltcli.formats.yaml.syntax import compose, place, read_yaml_text
 
 Key: TypeAlias = tuple[str | int, ...]
 # Values that may come from aliases and merges, over a whole file; what is written out may be any number.
@@ -112,7 +112,7 @@ def parse_yaml(path: Path | str) -> YamlFile:
     Raises:
         JobError: nothing useful can be read from the file.
     """
-    return parse_text(read_text(Path(path)), Path(path))
+    return parse_text(read_yaml_text(Path(path)), Path(path))
 
 
 def parse_text(text: str, path: Path) -> YamlFile:

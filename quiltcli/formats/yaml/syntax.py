@@ -16,6 +16,10 @@ from quiltcli.errors import JobError, Problem
 from quiltcli.formats.inputs import foreign_fault, read_input
 from quiltcli.formats.yaml.core import CoreResolver
 
+_MESHES = (".obj", ".ply", ".off", ".stl", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
+_PICTURES = (".exr", ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".hdr", ".pfm", ".dpx", ".mp4", ".mov")
+_NO_YAML = frozenset((*_MESHES, *_PICTURES))
+
 
 class _Loader(Reader, Scanner, Parser, Composer, CoreResolver):
     """The reader in Python, whose error messages are the same everywhere."""
@@ -46,6 +50,17 @@ def read_text(path: Path) -> str:
             f"not UTF-8 text: byte 0x{raw[error.start]:02x} at offset {error.start} (save the file as UTF-8)"
         )
         raise JobError(Problem(text, str(path), line, column)) from None
+
+
+def read_yaml_text(path: Path) -> str:
+    """As `read_text`, of a file that is not by its name a mesh or a picture.
+
+    Raises:
+        JobError: it is one, or cannot be read as text.
+    """
+    if path.suffix.lower() in _NO_YAML and path.is_file():
+        raise JobError(Problem(f"is a {path.suffix.lower()} file (expected a YAML file)", str(path)))
+    return read_text(path)
 
 
 def compose(text: str, path: Path) -> yaml.Node | None:

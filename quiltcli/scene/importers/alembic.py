@@ -33,7 +33,7 @@ from quiltcli.scene.importers.cuts import (
     part_of,
     placed_cut,
 )
-from quiltcli.scene.importers.model import ONLY_CLIP, FileLight, Playing, check_only_clip
+from quiltcli.scene.importers.model import NO_SUBDIVISION, ONLY_CLIP, FileLight, Playing, check_only_clip
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.materials import Surface
 
@@ -70,6 +70,10 @@ class AlembicModel:
     def check(self, playing: Playing) -> None:
         """Raise a `MeshError` unless the animations that are asked for are there."""
         check_only_clip(str(self.archive.path), playing)
+
+    def subdivided(self, levels: int) -> AlembicModel:
+        """Nothing: there are no surfaces to refine."""
+        raise MeshError(Problem(NO_SUBDIVISION, str(self.archive.path)))
 
     def contested(self, playing: Playing) -> int:
         """Nothing is moved twice by one animation."""

@@ -15,7 +15,7 @@ from quiltcli.formats.mesh.read import READERS, read_polygons
 from quiltcli.formats.usd import SUFFIXES as USD_SUFFIXES
 from quiltcli.scene.importers.alembic import read_alembic_model
 from quiltcli.scene.importers.gltf import read_gltf_model
-from quiltcli.scene.importers.model import Model
+from quiltcli.scene.importers.model import NO_SUBDIVISION, Model
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.importers.polygons import parts_of_polygons
 from quiltcli.scene.importers.usd import read_usd_model
@@ -50,14 +50,24 @@ class Asset:
     model: Model | None = None
 
 
-def read_asset(path: Path) -> Asset:
+def read_asset(path: Path, subdivision: int = 0) -> Asset:
     """Read a scene mesh.
 
+    Args:
+        path: its file.
+        subdivision: how many times its subdivision surfaces are refined.
+
     Raises:
-        SceneError: the file is missing, of an unknown kind, damaged, or holds no triangles.
+        SceneError: the file is missing, of an unknown kind, damaged, or holds no triangles, or there are no
+            subdivision surfaces that could be refined.
     """
     _check_file(path)
-    asset = _polygon_asset(path) if path.suffix.lower() in READERS else _model_asset(path)
+    if path.suffix.lower() not in READERS:
+        asset = _model_asset(path, subdivision)
+    elif subdivision:
+        raise SceneError(Problem(NO_SUBDIVISION, str(path)))
+    else:
+        asset = _polygon_asset(path)
     if not any(len(part.triangles) for part in asset.parts):
         raise SceneError(Problem("holds no triangles", str(path)))
     return asset
@@ -89,9 +99,11 @@ def _place(mesh: PolygonMesh, face: int) -> str:
     return f" (face {face + 1}, line {line})" if line else f" (face {face + 1})"
 
 
-def _model_asset(path: Path) -> Asset:
+def _model_asset(path: Path, subdivision: int) -> Asset:
     try:
         model = MODELS[path.suffix.lower()](path)
+        if subdivision:
+            model = model.subdivided(subdivision)
         parts = model.parts()
     except MeshError as error:
         raise SceneError(error.problems) from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from quiltcli.errors import counted
 from quiltcli.formats.corners import Dress, Faces
@@ -27,12 +28,19 @@ class Form:
         dress: what their corners carry.
         cuts: triangles by materials.
         flaws: what of the mesh cannot be drawn.
+        refining: (V', V) its vertices from those of the file, where it is subdivided.
     """
 
     faces: Faces
     dress: Dress
     cuts: tuple[Cut, ...]
     flaws: tuple[str, ...]
+    refining: csr_matrix | None = None
+
+    @property
+    def vertices(self) -> int:
+        """How many the file has."""
+        return self.faces.corners.vertices if self.refining is None else int(self.refining.shape[1])
 
     @property
     def triangles(self) -> int:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from quiltcli.errors import MeshError, Problem
 from quiltcli.formats.gltf import Gltf, Material, read_gltf
 from quiltcli.formats.gltf.animation import chosen_clips
 from quiltcli.formats.gltf.model import Clip
@@ -27,7 +28,7 @@ from quiltcli.formats.gltf.posing import (
     rest_pose,
 )
 from quiltcli.geometry import BoolArray, Float32Array, FloatArray, normalized
-from quiltcli.scene.importers.model import FileLight, Playing, triple
+from quiltcli.scene.importers.model import NO_SUBDIVISION, FileLight, Playing, triple
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.materials import Surface, Texture
 from quiltcli.scene.textures.picture import Picture
@@ -85,6 +86,10 @@ class GltfModel:
     def check(self, playing: Playing) -> None:
         """Raise a `MeshError` unless the file has the animations that are asked for."""
         self.chosen(playing)
+
+    def subdivided(self, levels: int) -> GltfModel:
+        """Nothing: there are no surfaces to refine."""
+        raise MeshError(Problem(NO_SUBDIVISION, str(self.gltf.path)))
 
     def contested(self, playing: Playing) -> int:
         """Number of channels that are not played, as a clip before theirs moves the same thing."""

@@ -88,6 +88,9 @@ def check_only_clip(path: str, playing: Playing) -> None:
             raise MeshError(Problem(f"has no animation {name!r} (it has one, {ONLY_CLIP!r})", path))
 
 
+NO_SUBDIVISION = "has no subdivision surfaces that could be refined (expected USD with catmullClark meshes)"
+
+
 class Model(Protocol):
     """A file with parts that may move, ready to be posed at any time.
 
@@ -104,6 +107,9 @@ class Model(Protocol):
 
     def check(self, playing: Playing) -> None:
         """Raise a `MeshError` unless the file has the animations that are asked for."""
+
+    def subdivided(self, levels: int) -> Model:
+        """The same with subdivision surfaces refined so many times; a `MeshError` where there are none."""
 
     def contested(self, playing: Playing) -> int:
         """Number of movements that are not played, as another clip moves the same thing."""

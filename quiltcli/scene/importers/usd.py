@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from quiltcli.errors import counted
+from quiltcli.errors import MeshError, Problem, counted
 from quiltcli.formats.corners import Faces, normals_of_groups, same_normals
+from quiltcli.formats.subdivision import subdivided
 from quiltcli.formats.usd.changes import Movement, movement
-from quiltcli.formats.usd.mesh import read_dress, read_faces, read_points, subset_rows
+from quiltcli.formats.usd.mesh import read_dress, read_faces, read_points, read_sharpness, subset_rows
 from quiltcli.formats.usd.places import Moment
 from quiltcli.formats.usd.primvars import read_normals
 from quiltcli.formats.usd.skins import skinned
-from quiltcli.formats.usd.stage import Stage, library, open_stage, understood
-from quiltcli.formats.usd.walk import Piece, Shown, walk
+from quiltcli.formats.usd.stage import Stage, library, open_stage, path_of, understood
+from quiltcli.formats.usd.walk import Piece, Shown, listed, walk
 from quiltcli.geometry import FloatArray
 from quiltcli.scene.importers.cuts import (
     MOST_TRIANGLES,
@@ -30,7 +31,7 @@ from quiltcli.scene.importers.cuts import (
     part_of,
     placed_cut,
 )
-from quiltcli.scene.importers.model import ONLY_CLIP, FileLight, Playing, check_only_clip
+from quiltcli.scene.importers.model import NO_SUBDIVISION, ONLY_CLIP, FileLight, Playing, check_only_clip
 from quiltcli.scene.importers.part import Part
 from quiltcli.scene.importers.usd_lights import lights_at, lights_lost
 from quiltcli.scene.importers.usd_surfaces import lost, surface_of, uv_names
@@ -46,11 +47,13 @@ class UsdModel:
         stage: the stage.
         shown: what it shows.
         movement: what of it moves.
+        levels: how many times its subdivision surfaces are refined.
     """
 
     stage: Stage
     shown: Shown
     movement: Movement
+    levels: int = 0
     _forms: dict[int, dict[bytes, Form]] = field(default_factory=dict)
     _points: dict[int, Posed] = field(default_factory=dict)
 
@@ -65,7 +68,22 @@ class UsdModel:
         with understood(self.stage.path):
             return (*self.stage.notices, *self.shown.notices, *self._own_notices())
 
+    def subdivided(self, levels: int) -> UsdModel:
+        """The same with its subdivision surfaces refined so many times.
+
+        Raises:
+            MeshError: there are none.
+        """
+        if not self.shown.cages:
+            raise MeshError(Problem(NO_SUBDIVISION, str(self.stage.path)))
+        return UsdModel(self.stage, self.shown, self.movement, levels)
+
     def _own_notices(self) -> Iterator[str]:
+        if self.shown.cages and not self.levels:
+            yield (
+                "subdivision surfaces drawn as the polygons of their cages ('subdivision' of the object"
+                f" refines them): {listed(self.shown.cages)}"
+            )
         if self.movement.dresses and self.movement.clock is not None:
             count = counted(len(self.movement.dresses), "mesh").replace("meshs", "meshes")
             yield f"colours or texture coordinates that change over time rest ({count})"
@@ -95,8 +113,13 @@ class UsdModel:
             moment = self._moment(seconds, playing)
             everything = self._all_hidden(moment)
             return tuple(
-                (len(self._places(moment, self.shown.pieces[number], everything)), self._key(number, moment))
-                + tuple(moment.shown(place) for place in self.shown.pieces[number].places)
+                (
+                    self._form(number, moment).faces.key,
+                    *(
+                        moment.count(place) if everything or moment.shown(place) else 0
+                        for place in self.shown.pieces[number].places
+                    ),
+                )
                 for number in sorted(self.movement.forms)
             )
 
@@ -159,7 +182,8 @@ class UsdModel:
         """Metres, Y up, from the space of a mesh (C, 4, 4), for all its copies that are seen."""
         seen = [place for place in piece.places if everything or moment.shown(place)]
         found = [moment.matrices(place) for place in seen]
-        return np.asarray(self.stage.world @ np.concatenate([np.empty((0, 4, 4)), *found]))
+        with np.errstate(over="ignore", invalid="ignore"):  # bake drops what is nowhere
+            return np.asarray(self.stage.world @ np.concatenate([np.empty((0, 4, 4)), *found]))
 
     def _check_size(self, moment: Moment, everything: bool) -> None:
         """Count before anything is copied: a small file can ask for very much."""
@@ -170,13 +194,10 @@ class UsdModel:
                 words = f"and all before it show {total:,} triangles (expected at most {MOST_TRIANGLES:,})"
                 raise self.stage.error(piece.prim, words)
 
-    def _key(self, number: int, moment: Moment) -> bytes:
-        return read_faces(self.stage, self.shown.pieces[number].mesh, moment.time).key
-
     def _form(self, number: int, moment: Moment) -> Form:
         """A mesh's triangles at a time; the last ones are kept."""
         kept = self._forms.setdefault(number, {})
-        if kept and number not in self.movement.forms:
+        if kept and number not in self.movement.faces:
             return next(iter(kept.values()))
         piece = self.shown.pieces[number]
         faces = read_faces(self.stage, piece.mesh, moment.time)
@@ -191,14 +212,25 @@ class UsdModel:
         dress = read_dress(self.stage, mesh, faces, piece.asked(uv_names(piece)), time, moving=moving)
         points = read_points(self.stage, mesh, time, faces.corners.vertices)
         rows = subset_rows(self.stage, list(piece.subsets), faces)
-        return form_of(str(self.stage.path), faces, dress, points, rows)
+        if not self.levels or path_of(piece.prim) not in self.shown.cages:
+            return form_of(str(self.stage.path), faces, dress, points, rows)
+        if len(faces.corners.vertex) * 4**self.levels > MOST_TRIANGLES:
+            words = f"is refined to more than {MOST_TRIANGLES:,} corners (give it less subdivision)"
+            raise self.stage.error(piece.prim, words)
+        sharp = read_sharpness(self.stage, mesh, time, faces.corners.vertices)
+        found = subdivided(faces, dress, *sharp, self.levels)
+        refined = np.asarray(found.points @ points)
+        form = form_of(str(self.stage.path), found.faces, found.dress, refined, rows[found.owner])
+        return replace(form, refining=found.points)
 
     def _posed(self, number: int, moment: Moment) -> Posed:
         """A mesh at a time; those that rest are kept."""
         if number in self._points:
             return self._points[number]
         piece, form = self.shown.pieces[number], self._form(number, moment)
-        points = read_points(self.stage, piece.mesh, moment.time, form.faces.corners.vertices)
+        points = read_points(self.stage, piece.mesh, moment.time, form.vertices)
+        if form.refining is not None:
+            return self._smooth(number, moment, form, points)
         normals = read_normals(self.stage, piece.mesh, form.faces.corners, moment.time)
         directions = None if normals is None else normals.at_corners
         if piece.skin is not None:
@@ -207,7 +239,18 @@ class UsdModel:
                 # Smooth where the mesh's own are one, and sharp where they differ.
                 directions = normals_of_groups(points, form.faces, same_normals(form.faces, normals))
         posed = Posed(points, directions)
-        if number not in self.movement.points and number not in self.movement.forms:
+        if number not in self.movement.points:
+            self._points[number] = posed
+        return posed
+
+    def _smooth(self, number: int, moment: Moment, form: Form, points: FloatArray) -> Posed:
+        """A subdivision surface at a time; its normals are found from its faces."""
+        piece = self.shown.pieces[number]
+        assert form.refining is not None
+        if piece.skin is not None:
+            points = skinned(piece.prim, piece.skin, moment, points)
+        posed = Posed(np.asarray(form.refining @ points), None)
+        if number not in self.movement.points:
             self._points[number] = posed
         return posed
 

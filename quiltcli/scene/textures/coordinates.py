@@ -11,6 +11,9 @@ from quiltcli.geometry import FloatArray, Int32Array, IntArray
 from quiltcli.scene.scene import Scene
 from quiltcli.scene.textures.pool import Lay
 
+FARTHEST = 2.0**40
+"""Pictures away from the first, beyond which there is none."""
+
 
 def corner_coordinates(
     scene: Scene, triangle: Int32Array | IntArray, uv_set: NDArray[Any] | int
@@ -31,4 +34,8 @@ def texture_corners(scene: Scene, triangle: Int32Array | IntArray, lay: Lay) -> 
     u, v = corner_coordinates(scene, triangle, lay.uv_set.take(material))
     v = 1.0 - v
     rows = lay.matrix.take(material, axis=0)
-    return np.stack([rows[:, k, 0] * u + rows[:, k, 1] * v + rows[:, k, 2] for k in range(2)])
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = np.stack([rows[:, k, 0] * u + rows[:, k, 1] * v + rows[:, k, 2] for k in range(2)])
+        # Places so far away are no places: no texel could be told from the next.
+        nowhere = ~(np.abs(found) < FARTHEST)
+    return np.where(nowhere, 0.0, found) if nowhere.any() else found

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from quiltcli.calibration.panels.corners import COLUMNS, corner_table, fit_corners, read_corners
+from quiltcli.calibration.panels.corners import (
+    COLUMNS,
+    corner_table,
+    doubtful_corners,
+    fit_corners,
+    read_corners,
+    turned_facets,
+)
 from quiltcli.calibration.panels.display_files import moved_display, panel_angles
 from quiltcli.calibration.panels.distances import enlarged
 from quiltcli.calibration.panels.start import middles_of
@@ -50,8 +60,6 @@ def test_moved_facets_come_back_with_their_rasters(display, tmp_path, scale):
     spec, facets = display
     rng = np.random.default_rng(1)
     turns, shifts = 0.1 * rng.normal(size=(2, facets.count, 3))
-    from scipy.spatial.transform import Rotation
-
     large = facets if scale == 1 else enlarged(facets, scale, np.array([0.1, 0.2, 0.3]))
     middles = middles_of(large.corners, large.corner_start)
     matrices = Rotation.from_rotvec(turns).as_matrix()
@@ -129,3 +137,36 @@ def test_tables_that_cannot_be_read_are_told_by_line(tmp_path):
     assert ":3: expected 5 values, got 3" in said(lambda rows: rows.__setitem__(2, "1,2,0"))
     with pytest.raises(JobError, match="no such file"):
         read_corners(tmp_path / "none.csv", facets)
+
+
+def test_tables_of_another_display_or_unit_are_doubted(display, tmp_path):
+    _, facets = display
+
+    def said(corners, units="m"):
+        return "\n".join(map(str, doubtful_corners(tmp_path / "t.csv", facets, corners, units)))
+
+    # A survey has axes of its own, and noise.
+    rng = np.random.default_rng(5)
+    turns, shifts = 0.05 * rng.normal(size=(2, facets.count, 3))
+    around = Rotation.from_euler("xyz", (40, 120, 200), degrees=True)
+    real = around.apply(moved(facets, turns, shifts).corners) + (3, 40, -200)
+    real += 0.0005 * rng.normal(size=real.shape)
+    assert said(real) == ""
+    assert list(turned_facets(facets, real)) == []
+    for unit, metres in (("mm", 0.001), ("ft", 0.3048), ("in", 0.0254), ("cm", 0.01)):
+        assert f"is it measured in {unit}?" in said(real / metres)
+    assert "taken in in (is it measured in m? --units)" in said(0.0254 * real, "in")
+    assert "facet 1" in said(np.zeros_like(real))
+    last = slice(facets.corner_start[-2], None)
+    for first, second in ((0, 1), (1, 2), (0, 2)):
+        wrong = real.copy()
+        wrong[last][[first, second]] = real[last][[second, first]]
+        # Exchanged across, those of a square make the same square, seen from behind.
+        found = said(wrong) or "\n".join(turned_facets(facets, wrong))
+        assert re.search(
+            rf"the corners of facet {facets.count} |facet {facets.count}.* turned by 1[678]\d°", found
+        )
+    wrong = real.copy()
+    wrong[last] *= 3
+    assert f"facet {facets.count}" in said(wrong)
+    assert "× as large as in the display (expected about its size)" in said(wrong)

@@ -7,9 +7,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quiltcli.errors import MeshError, MissingExtraError
+from quiltcli.errors import MeshError, MissingExtraError, SceneError
+from quiltcli.formats.mesh import read_mesh
+from quiltcli.scene import load_scene
+from quiltcli.scene.importers.asset import read_asset
 from tests.helpers.usd_files import (
+    bound,
     corners,
+    material,
     mesh,
     moved,
     needs_usd,
@@ -226,7 +231,8 @@ def test_cages_of_subdivided_surfaces_and_other_shapes_are_spoken_of(tmp_path):
     assert notices(path) == (
         "1 BasisCurves prim left out",
         "1 camera left out",
-        "/square subdivided by their subdivisionScheme: the polygons of the cage are drawn",
+        "subdivision surfaces drawn as the polygons of their cages ('subdivision' of the object refines them):"
+        " /square",
     )
 
 
@@ -353,6 +359,30 @@ def test_planes_face_along_their_axis(tmp_path, axis, normal):
     np.testing.assert_allclose(area(corners(path)), np.multiply(normal, 6))
 
 
+def test_a_sphere_may_be_a_display(tmp_path):
+    found = read_mesh(stage(tmp_path / "a.usda", 'def Sphere "s"\n{\n}\n'))
+    assert found.count == 96 * 48
+
+
+@pytest.mark.parametrize("far", ["nan", "inf", "1e300"])
+def test_what_is_nowhere_is_dropped_from_scenes_and_refused_as_a_display(tmp_path, far):
+    ops = f"double3 xformOp:translate = ({far}, 0, 0)\nfloat3 xformOp:scale = (1, 1, 1)"
+    order = '"xformOp:translate", "xformOp:scale"'
+    path = stage(tmp_path / "a.usda", mesh("here"), xform("x", mesh("gone"), ops=ops, order=order))
+    scene = load_scene(path)
+    assert len(scene.triangles) == 2
+    assert "a: 2 triangles with NaN or infinite vertices dropped" in scene.notices
+    with pytest.raises(MeshError, match=r"vertex 5 is \("):
+        read_mesh(path)
+
+
+def test_names_that_are_no_text_are_an_error(tmp_path):
+    path = stage(tmp_path / "a.usda", mesh(**bound("m")), material("m", "token inputs:x = 'é'"))
+    path.write_bytes(path.read_bytes().replace("é".encode(), b"\xe1("))
+    with pytest.raises(MeshError, match="UTF-8"):
+        parts_of(path)
+
+
 def test_shapes_have_their_colours_and_those_above(tmp_path):
     ops = 'color3f[] primvars:displayColor = [(0.5, 0, 0)] (interpolation = "constant")'
     (part,) = parts_of(stage(tmp_path / "a.usda", xform("x", 'def Cube "c"\n{\n}\n', ops=ops)))
@@ -363,3 +393,41 @@ def test_sizes_of_shapes_that_make_no_sense_are_errors(tmp_path):
     path = stage(tmp_path / "a.usda", 'def Sphere "s"\n{\ndouble radius = -1\n}\n')
     with pytest.raises(MeshError, match=r"/s\.radius: is -1 \(expected a number, 0 or more\)"):
         parts_of(path)
+
+
+CUBE = [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
+SIDES = [0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5]
+
+
+def cubic(folder, more=""):
+    cage = mesh("cage", points=CUBE, counts=[4] * 6, indices=SIDES, more=more)
+    return stage(folder / "a.usda", cage.replace('"none"', '"catmullClark"'), mesh("flat"))
+
+
+def test_cages_are_refined_where_that_is_asked_for(tmp_path):
+    asset = read_asset(cubic(tmp_path), 3)
+    assert [len(part.triangles) for part in asset.parts] == [6 * 64 * 2, 2]
+    assert asset.notices == ()
+    assert np.linalg.norm(asset.parts[0].vertices, axis=1).max() < 0.9
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("quilt_scene: 1\nobjects: [{mesh: a.usda, subdivision: 1}]\n")
+    assert len(load_scene(scene).triangles) == 6 * 4 * 2 + 2
+
+
+def test_creases_are_taken_and_checked(tmp_path):
+    creases = (
+        "int[] creaseIndices = [4, 5, 7, 6, 4]\nint[] creaseLengths = [5]\nfloat[] creaseSharpnesses = [10]\n"
+        "int[] cornerIndices = [0]\nfloat[] cornerSharpnesses = [10]"
+    )
+    (part, _) = read_asset(cubic(tmp_path, creases), 2).parts
+    assert part.vertices[:, 2].max() == 1
+    np.testing.assert_array_equal(part.vertices[0], (-1, -1, -1))
+    with pytest.raises(SceneError, match=r"/cage\.creaseLengths: sums up to 4 \(expected 5 creaseIndices"):
+        read_asset(cubic(tmp_path, creases.replace("[5]", "[4]")), 2)
+    with pytest.raises(SceneError, match=r"/cage\.creaseIndices: names point 9 of 8"):
+        read_asset(cubic(tmp_path, creases.replace("4, 5, 7, 6, 4", "4, 5, 9, 6, 4")), 2)
+
+
+def test_only_cages_can_be_refined(tmp_path):
+    with pytest.raises(SceneError, match="has no subdivision surfaces that could be refined"):
+        read_asset(stage(tmp_path / "a.usda", mesh()), 1)

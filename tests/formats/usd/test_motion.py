@@ -254,3 +254,30 @@ def test_normals_of_a_skin_are_made_anew_and_stay_sharp_where_they_were(tmp_path
         found = sorted(normals[edge].tolist())
         lengths = np.linalg.norm(expected, axis=1, keepdims=True)
         np.testing.assert_allclose(found, np.array(expected) / lengths, atol=1e-6)
+
+
+def test_what_changes_its_faces_is_not_kept(tmp_path):
+    counts = ", ".join(f"{k}: [{3 + k % 3}]" for k in range(30))
+    indices = ", ".join(f"{k}: {list(range(3 + k % 3))}" for k in range(30))
+    text = mesh(points=[(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0)]).replace(
+        "int[] faceVertexCounts = [4]\nint[] faceVertexIndices = [0, 1, 2, 3]",
+        f"int[] faceVertexCounts.timeSamples = {{{counts}}}\n"
+        f"int[] faceVertexIndices.timeSamples = {{{indices}}}",
+    )
+    blinking = xform("x", mesh("still"), ops=BLINKS)
+    model = read_usd_model(stage(tmp_path / "a.usda", text, blinking))
+    for k in range(30):
+        triangles = [len(part.triangles) for part in model.parts(k / 24, Playing())]
+        assert triangles == [1 + k % 3, 0 if 10 <= k < 20 else 2]
+    kept = [len(forms) for forms in model._forms.values()]
+    assert kept == [2, 1]
+    assert len(model._points) == 1
+
+
+def test_prototypes_may_be_native_instances(tmp_path):
+    kind = xform("kind", mesh()).replace("def", "class", 1)
+    use = xform("p", meta="instanceable = true\nreferences = </kind>")
+    more = "int[] protoIndices = [0, 0]\npoint3f[] positions = [(0, 0, 0), (5, 0, 0)]"
+    text = f'def PointInstancer "i"\n{{\nrel prototypes = [</i/p>]\n{more}\n{use}\n}}\n'
+    found = parts_of(stage(tmp_path / "a.usda", kind, text))
+    assert [part.vertices[::4, 0].tolist() for part in found] == [[0, 5]]

@@ -1,6 +1,7 @@
 """What becomes of pictures beyond a frame: in checks, tables, ghosts of scenes, hashes and moving scenes."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -121,3 +122,10 @@ def test_workers_draw_a_sequence_of_textured_files_as_one_process_does(tmp_path,
         pictures.append([file.read_bytes() for file in files])
     assert pictures[0] == pictures[1]
     assert pictures[0][0] != pictures[0][1]
+
+
+def test_a_picture_that_lies_nowhere_shows_one_place(job):
+    mesh = job.parent / "floor.obj"
+    mesh.write_text(re.sub(r"^vt .*$", "vt 1e300 -1e300", mesh.read_text(), count=1, flags=re.MULTILINE))
+    result = run("render", job, "-f", "1", "-j", "1")
+    assert result.exit_code == 0, result.output
