@@ -50,6 +50,21 @@ def test_the_display_that_comes_with_quilt_passes() -> None:
     assert verdict.edges > 0
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("reflection", ["plane", "cone"])
+def test_what_the_display_that_comes_with_quilt_is_sent_passes(tmp_path: Path, reflection: str) -> None:
+    """Positions on the disk, bits and light, and a quarter of their pixels by rays."""
+    display = tmp_path / "turn.yaml"
+    text = (ROOT / "display_models" / "spinning_mirror.yaml").read_text()
+    display.write_text(text.replace("reflection: plane", f"reflection: {reflection}"))
+    sets = [f"display={display}", "output.tones=true", f"output.directory={tmp_path / 'out'}"]
+    job = load_job(ROOT / "scenes" / "demo_mirror.yaml", sets)
+    render_turns(job, RingOptions(positions=range(1, 289, 24)))
+    verdict = verify_turn(job, RingVerifyOptions(pixels=12 * 120_000))
+    assert verdict.passed, verdict
+    assert (verdict.bits, verdict.tones, verdict.rays) == (12, 12, 12 * 120_000)
+
+
 def test_straight_edges_are_found_wrong(tmp_path: Path) -> None:
     job = load_job(ring_job(tmp_path, method="vertex", size=160), ["render.tessellate=9"])
     verdict = verify_turn(job, RingVerifyOptions(redraw=True))
