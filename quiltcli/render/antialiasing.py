@@ -24,11 +24,11 @@ from quiltcli.geometry import BoolArray, FloatArray
 from quiltcli.layout import Layout
 from quiltcli.render.buffers import Buffers, background_of
 from quiltcli.render.setup import Stage
-from quiltcli.render.sums import Sums, new_sums, write_alike
 from quiltcli.shading.aovs import shaded_for, wanted_for
 from quiltcli.shading.layers import layers
 from quiltcli.shading.once import may_be_once, shaded_once
 from quiltcli.shading.shadows import Sample
+from quiltcli.shading.sums import Sums, new_sums, write_alike
 from quiltcli.visibility.draw import Cells, Frame, draw
 
 _WORTH_SETTLING = 3  # samples; fewer are looked at faster one by one

@@ -19,9 +19,9 @@ from quiltcli.render.buffers import (
     mends_itself,
 )
 from quiltcli.render.setup import Stage
-from quiltcli.render.sums import Background, Sums, summed
 from quiltcli.shading.aovs import fill, shaded_for, wanted_for
 from quiltcli.shading.layers import Layer, layers
+from quiltcli.shading.sums import Background, Sums, summed
 from quiltcli.visibility.draw import Drawing, Frame, Hits, Wanted, draw
 from quiltcli.visibility.scan.depth_buffers import DepthOrder, depth_order
 

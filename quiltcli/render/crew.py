@@ -18,7 +18,7 @@ from quiltcli.render.antialiasing import add_samples
 from quiltcli.render.batch import Drawn, draw_batch, ordered
 from quiltcli.render.buffers import Buffers, clear_blocks
 from quiltcli.render.setup import Stage
-from quiltcli.render.sums import Background, Sums, new_sums, summed
+from quiltcli.shading.sums import Background, Sums, new_sums, summed
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import Binned, BinPlan, bin_frame, bin_plan

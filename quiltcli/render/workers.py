@@ -45,10 +45,10 @@ from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import Places, Threads, plan_of, shares_of
 from quiltcli.render.setup import Stage
 from quiltcli.render.shared import SharedArrays
-from quiltcli.render.sums import Sums, new_sums, summed
 from quiltcli.render.workplace import Fault, Item, Moved, Task, Workplace, serve
 from quiltcli.scene.textures.tangents import tangents_of
 from quiltcli.shading.lights import prepare_shadows
+from quiltcli.shading.sums import Sums, new_sums, summed
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame
 from quiltcli.visibility.shares import (

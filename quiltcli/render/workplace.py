@@ -28,7 +28,7 @@ from quiltcli.render.buffers import Buffers, clear_blocks
 from quiltcli.render.crew import Places, develop, plan_of
 from quiltcli.render.setup import Stage
 from quiltcli.render.shared import AttachedArrays
-from quiltcli.render.sums import Sums
+from quiltcli.shading.sums import Sums
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Frame, pairs_by_block
 from quiltcli.visibility.shares import (

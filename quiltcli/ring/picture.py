@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quiltcli.channels import CHANNELS, MOST_HALF, empty_buffers
-from quiltcli.geometry import BoolArray, Float32Array, IntArray, slices
+from quiltcli.channels import MOST_HALF, empty_buffers
+from quiltcli.geometry import BoolArray, IntArray, slices
 from quiltcli.lightfield import Field
 from quiltcli.projection.gaze import Gaze
 from quiltcli.ring.cast import lines_of
@@ -25,10 +25,11 @@ from quiltcli.ring.rebin import rebinned
 from quiltcli.ring.rig import Pose, Rig
 from quiltcli.scene import Scene
 from quiltcli.shading.adaptive import Shaded
-from quiltcli.shading.aovs import fill, light_at_points
+from quiltcli.shading.aovs import fill
 from quiltcli.shading.layers import Layer, blended
 from quiltcli.shading.shadows import CENTRE, Sample
 from quiltcli.shading.sky import sky_at
+from quiltcli.shading.sums import Background, Sums, new_sums, summed
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.resolve.layers import LayerHits
 
@@ -149,7 +150,7 @@ def draw_picture(show: Show, angle: float, side: int = 0) -> Picture:
         return Picture(pose, lit, buffers, _photographed(show, show.field, pose, lit, buffers))
     _background(show, pose, lit, buffers)
     several = len(show.samples) > 1
-    light = tuple(name for name in show.channels if CHANNELS[name].averaged and several)
+    light = summed(show.channels) if several else ()
     rest = tuple(name for name in show.channels if name not in light)
     if rest:
         counts.add(_centres(show, pose, lit, rest, buffers))
@@ -199,14 +200,14 @@ def _centres(
     for part in slices(0, seen.pixel.size, _CHUNK):
         fill(buffers, channels, gaze, _shaded(show, pose, seen, address, part))
     if seen.through is not None:
-        light = tuple(name for name in channels if CHANNELS[name].averaged)
+        light = summed(tuple(channels))
         data = tuple(name for name in channels if name not in light)
-        sums = _Sums(lit.size, light)
+        sums = _sums(lit, light)
         for layer in _layers(show, pose, seen):
             sums.add(layer.shaded, layer.weight)
             fill(buffers, data, gaze, layer.shaded, np.flatnonzero(layer.first))
             counts.visible += int(np.count_nonzero(layer.first))
-        sums.store(show, buffers, 1)
+        sums.store(buffers, 1, _behind(show, buffers))
     counts.seconds["shade"] = time.perf_counter() - start
     return counts
 
@@ -215,7 +216,7 @@ def _samples(
     show: Show, pose: Pose, lit: BoolArray, channels: Sequence[str], buffers: dict[str, NDArray[Any]]
 ) -> Counts:
     """Means of light over the samples; what misses the scene counts as background."""
-    sums, counts = _Sums(lit.size, channels), Counts()
+    sums, counts = _sums(lit, channels), Counts()
     for number, (place, cell) in enumerate(zip(show.samples, show.cells, strict=True)):
         seen, address, some = _look(show, pose, lit, place)
         sample = Sample(number, len(show.samples))
@@ -224,42 +225,20 @@ def _samples(
             sums.add(_shaded(show, pose, seen, address, part, cell, sample))
         for layer in _layers(show, pose, seen, cell, sample):
             sums.add(layer.shaded, layer.weight)
-    counts.visible = sums.store(show, buffers, len(show.samples))
+    counts.visible = sums.covered
+    sums.store(buffers, len(show.samples), _behind(show, buffers))
     return counts
 
 
-class _Sums:
-    """Sums of light over the samples and layers of pixels, and the share of samples that see the scene."""
+def _sums(lit: BoolArray, channels: Sequence[str]) -> Sums:
+    return Sums(new_sums(tuple(channels), lambda dtype: np.zeros(lit.size, dtype)), tuple(channels))
 
-    def __init__(self, size: int, channels: Sequence[str]) -> None:
-        self._cover = np.zeros(size, dtype=np.float32)
-        self._light = {name: [np.zeros(size, dtype=np.float32) for _ in range(3)] for name in channels}
 
-    def add(self, shaded: Shaded, weight: Float32Array | None = None) -> None:
-        """Add what pixels see, each once, or a share (P,) of it."""
-        pixel = shaded.hits.pixel
-        self._cover[pixel] += np.float32(1) if weight is None else weight
-        for name, sums in self._light.items():
-            for values, total in zip(light_at_points(name, shaded), sums, strict=True):
-                found = shaded.hits.drawn(np.minimum(values, MOST_HALF))
-                total[pixel] += found if weight is None else weight * found
-
-    def store(self, show: Show, buffers: dict[str, NDArray[Any]], samples: int) -> int:
-        """Write the means over so many samples; how many pixels see anything."""
-        pixel = np.flatnonzero(self._cover)
-        share, count = self._cover[pixel], np.float32(samples)
-        for name, totals in self._light.items():
-            for k, (layer, total) in enumerate(zip(CHANNELS[name].layers, totals, strict=False)):
-                values = total[pixel]
-                if name == "rgba":
-                    there = show.scene.background[k]
-                    if show.scene.sky is not None:
-                        there = buffers[layer][pixel].astype(np.float32)
-                    values += (count - share) * there
-                buffers[layer][pixel] = np.minimum(values / count, MOST_HALF)
-            if name == "rgba":
-                buffers["A"][pixel] = share / count
-        return int(pixel.size)
+def _behind(show: Show, buffers: dict[str, NDArray[Any]]) -> Background:
+    """What is seen where the scene is not: the background, or the sky that was laid."""
+    if show.scene.sky is None:
+        return show.scene.background
+    return lambda address: np.stack([buffers[name][address].astype(np.float32) for name in "RGB"])
 
 
 def _look(

@@ -30,12 +30,12 @@ from quiltcli.render.buffers import Buffers, background_of, clear, lay_backgroun
 from quiltcli.render.notices import frame_warnings
 from quiltcli.render.report import FrameRecord
 from quiltcli.render.setup import Stage
-from quiltcli.render.sums import Sums, new_sums, summed
 from quiltcli.scene import Scene
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import fill
 from quiltcli.shading.layers import Layer, blended
 from quiltcli.shading.shadows import CENTRE, Sample
+from quiltcli.shading.sums import Sums, new_sums, summed
 from quiltcli.viewer.viewer import Viewer
 from quiltcli.visibility.draw import Hits
 from quiltcli.visibility.rays.embree import Target, aim, cast, plane_distance, reach_along

@@ -20,6 +20,7 @@ from quiltcli.render.ring.setup import RingStage
 from quiltcli.ring.curve import Curve
 from quiltcli.ring.outline import lit_pixels
 from quiltcli.ring.picture import Counts, Picture, Show
+from quiltcli.shading.mattes import matte_attributes
 
 _FORMAT = 1
 
@@ -49,6 +50,7 @@ def write_tones(
         "quilt:projector": projector,
         "quilt:viewers": json.dumps(viewers_json(show.curve)),
         "quilt:reflection": stage.display.diffuser.reflection,
+        **matte_attributes(show.scene, stage.job.output.channels),
     }
     write_exr(path, channels, attributes, stage.job.output.compression)
 

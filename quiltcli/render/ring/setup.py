@@ -176,11 +176,11 @@ def _demand_memory(display: MirrorDisplayFile, rig: Rig) -> None:
 
 def _foreign(job: JobFile) -> Iterator[Problem]:
     """Problems with channels of facets that a mirror does not have."""
-    for name in ("motion", "cryptoobject", "cryptomaterial"):
-        if name in job.output.channels:
-            yield job.output.source.problem(
-                ("channels",), f"{name} is a channel of facets (expected no such channel beside ring)"
-            )
+    if "motion" in job.output.channels:
+        words = (
+            "motion is in pixels of a film, and pictures of mirror positions are none (expected no motion)"
+        )
+        yield job.output.source.problem(("channels",), words)
 
 
 def _elevated(stage: RingStage) -> Iterator[str]:

@@ -11,6 +11,7 @@ import pytest
 
 from quiltcli.errors import JobError, OutputError, SceneError, ViewerError
 from quiltcli.formats.bitplanes import read_packed, unpack
+from quiltcli.formats.exr.cryptomatte import identities
 from quiltcli.formats.exr.image import read_exr
 from quiltcli.job import load_job
 from quiltcli.render.ring import setup, turn
@@ -321,3 +322,20 @@ def test_edges_of_vertices_bend_as_far_as_they_may(whole: Path) -> None:
     fine = whole.parent / "fine.yaml"
     fine.write_text((whole.parent / "turn.yaml").read_text().replace("[48, 48]", "[512, 512]"))
     assert wrong("5") > 4 * wrong("0.01")
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+def test_mattes_add_up_to_what_is_seen(tmp_path: Path, samples: int) -> None:
+    sets = ["output.channels=[rgba, cryptoobject]", f"render.samples={samples}"]
+    job = load_job(ring_job(tmp_path, tones=True), sets)
+    render_turns(job, RingOptions(workers=1, positions=[6]))
+    image = read_exr(tmp_path / "out" / "tones" / "turn_0001.0006.exr")
+    alpha = image.channels["A"].astype(float)
+    assert 0.1 < alpha.mean() < 0.7
+    share = sum(image.channels[f"CryptoObject{k:02d}.{c}"].astype(float) for k in range(3) for c in "GA")
+    assert np.abs(share - alpha).max() < 1e-3
+    (name,) = set_ring_stage(job).scene.objects
+    whole = alpha == 1
+    assert (image.channels["CryptoObject00.R"][whole] == identities([name])[0]).all()
+    manifest = next(value for key, value in image.attributes.items() if key.endswith("/manifest"))
+    assert name in json.loads(str(manifest))

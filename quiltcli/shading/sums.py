@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from quiltcli.channels import CHANNELS, MOST_HALF, RANKS
 from quiltcli.geometry import Float32Array, IntArray
-from quiltcli.render.buffers import Buffers
 from quiltcli.shading.adaptive import Shaded
 from quiltcli.shading.aovs import light_at_points
 from quiltcli.shading.mattes import identities_of
 
 _ONE = np.float32(1)
+Layers: TypeAlias = Mapping[str, NDArray[Any]]
 Background: TypeAlias = "Float32Array | Callable[[IntArray], Float32Array]"
 
 
@@ -29,7 +29,7 @@ def summed(channels: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in channels if CHANNELS[name].averaged or CHANNELS[name].matte)
 
 
-def write_alike(shaded: Shaded, channels: tuple[str, ...], buffers: Buffers, count: int) -> None:
+def write_alike(shaded: Shaded, channels: tuple[str, ...], buffers: Layers, count: int) -> None:
     """Write what all of `count` samples of some pixels see alike: to the last bit the mean of their sum."""
     hits, whole = shaded.hits, np.float32(count)
     one = np.ones((1, 1), dtype=np.float16)
@@ -72,6 +72,11 @@ class Sums:
         """How many addresses there are."""
         return int(self._memory["cover"].size)
 
+    @property
+    def covered(self) -> int:
+        """How many pixels see anything."""
+        return int(np.count_nonzero(self._memory["cover"]))
+
     def add(self, shaded: Shaded, weight: Float32Array | None = None, times: int = 1) -> None:
         """Add what is seen at one sample of some pixels, each of them once.
 
@@ -111,7 +116,13 @@ class Sums:
             if not pixel.size:
                 return
 
-    def store(self, buffers: Buffers, count: int, background: Background, part: slice | None = None) -> None:
+    def store(
+        self,
+        buffers: Layers,
+        count: int,
+        background: Background,
+        part: slice | None = None,
+    ) -> None:
         """Write the means into the pixels of which any of `count` samples sees something.
 
         Args:
@@ -135,7 +146,12 @@ class Sums:
             values[pixel] = 0
 
     def _store_light(
-        self, buffers: Buffers, name: str, pixel: IntArray, count: int, background: Background
+        self,
+        buffers: Layers,
+        name: str,
+        pixel: IntArray,
+        count: int,
+        background: Background,
     ) -> None:
         seen: Float32Array = self._memory["cover"][pixel]
         whole = np.float32(count)
@@ -156,7 +172,7 @@ class Sums:
             seen /= whole
             self._put(buffers, "A", pixel, seen)
 
-    def _store_matte(self, buffers: Buffers, name: str, pixel: IntArray, count: int) -> None:
+    def _store_matte(self, buffers: Layers, name: str, pixel: IntArray, count: int) -> None:
         """Identities and coverage in the order of coverage."""
         share = np.stack([self._memory[f"{name}.share{k}"][pixel] for k in range(RANKS)])
         identity = np.stack([self._memory[f"{name}.identity{k}"][pixel] for k in range(RANKS)])
@@ -167,5 +183,5 @@ class Sums:
             buffers[layers[2 * k]][pixel + self._first] = identity[k].view(np.float32)
             buffers[layers[2 * k + 1]][pixel + self._first] = share[k] / np.float32(count)
 
-    def _put(self, buffers: Buffers, layer: str, pixel: IntArray, values: Float32Array) -> None:
+    def _put(self, buffers: Layers, layer: str, pixel: IntArray, values: Float32Array) -> None:
         buffers[layer][pixel + self._first] = np.minimum(values, MOST_HALF).astype(np.float16)
