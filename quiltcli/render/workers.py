@@ -43,6 +43,7 @@ from quiltcli.render.arena import (
 from quiltcli.render.batch import Drawn
 from quiltcli.render.buffers import Buffers
 from quiltcli.render.crew import Places, Threads, plan_of, shares_of
+from quiltcli.render.forking import wait_for_sleep
 from quiltcli.render.setup import Stage
 from quiltcli.render.shared import SharedArrays
 from quiltcli.render.workplace import Fault, Item, Moved, Task, Workplace, serve
@@ -304,6 +305,7 @@ def _forked(place: Workplace) -> _Worker:
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
     process = context.Process(target=serve, args=(theirs, place, os.getpid()), daemon=True)
+    wait_for_sleep()
     process.start()
     theirs.close()
     return _Worker(process, ours)

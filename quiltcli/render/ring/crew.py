@@ -19,6 +19,7 @@ from typing import Any
 from quiltcli.ending import SIGNALS
 from quiltcli.errors import CheckFailedError, Problem, QuiltError
 from quiltcli.formats.exr.image import use_threads
+from quiltcli.render.forking import wait_for_sleep
 from quiltcli.render.workers import can_fork
 
 
@@ -56,6 +57,7 @@ def shared_out(
         for _ in range(min(workers, len(items))):
             ours, theirs = context.Pipe()
             process = context.Process(target=_serve, args=(work, theirs, [*lines, ours]), daemon=True)
+            wait_for_sleep()
             process.start()
             theirs.close()
             lines.append(ours)
