@@ -132,12 +132,16 @@ def _wound(part: Part) -> IntArray:
 def _broken(vertices: FloatArray, triangles: IntArray) -> tuple[BoolArray, BoolArray]:
     """Triangles (T,) with a vertex that is nowhere, and the other ones that have no area."""
     with np.errstate(all="ignore"):
-        points = vertices[triangles]
-        edges = np.roll(points, -1, axis=1) - points
-        length = dot(edges, edges).max(axis=1)
+        # A corner after another: what all three together take of memory takes time, too.
+        a, b, c = (vertices.take(corner, axis=0) for corner in triangles.T)
+        length = np.zeros(len(triangles))
+        for one, other in ((a, b), (b, c), (c, a)):
+            edge = other - one
+            np.maximum(length, dot(edge, edge), out=length)
         normal = face_normals(vertices, triangles)
         area = np.sqrt(dot(normal, normal))
-        infinite = ~((np.abs(points) <= FARTHEST).all(axis=(1, 2)) & np.isfinite(area))
+        near = (np.abs(vertices) <= FARTHEST).all(axis=1)
+        infinite = ~(near.take(triangles).all(axis=1) & np.isfinite(area))
         return infinite, ~infinite & ~(area > _THINNEST * length)
 
 

@@ -96,6 +96,8 @@ def triangulate(points: FloatArray, start: IntArray) -> Triangles:
     counts = np.diff(start)
     fans = counts == 3
     wide = np.flatnonzero(~fans)
+    if not len(wide):
+        return Triangles(start[:-1, None] + np.arange(3), np.arange(len(counts)))
     if len(wide):
         part, place = some_rows(start, wide)
         own = points[place]
