@@ -117,10 +117,10 @@ def _memory(what: str, number: int, folder: Path) -> dict[str, int]:
     return found
 
 
-def _resident() -> int:
-    """Bytes of this process in memory."""
+def _resident(kind: str = "VmRSS") -> int:
+    """Bytes of this process in memory; of the kind VmHWM the most there were."""
     lines = Path("/proc/self/status").read_text().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) * 1024
+    return next(int(line.split()[1]) for line in lines if line.startswith(kind)) * 1024
 
 
 def _of_sequence(frames: int, folder: Path) -> dict[str, int]:
@@ -148,14 +148,12 @@ def _of_sequence(frames: int, folder: Path) -> dict[str, int]:
 
 def _of_samples(samples: int) -> dict[str, int]:
     """The most memory while a frame of so many samples is drawn."""
-    import resource
-
     place = cube(DENSITY / 8)
     stage: Stage = stage_for(place, meshes.room(), (1024, 1024))
     render = stage.job.render.model_copy(update={"samples": samples})
     stage = replace(stage, job=stage.job.model_copy(update={"render": render}))
     draw_frame(stage, viewer_of(place), new_buffers(stage))
-    return {"most": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}
+    return {"most": _resident("VmHWM")}
 
 
 if __name__ == "__main__":
